@@ -24,12 +24,12 @@ def main() -> None:
     from cspr_jax.published import chapter_3 as tables
 
     checker = tables.checker_of(options.amplitude)
-    places = [np.array([x * tables.RADIUS, y * tables.RADIUS, tables.DEPTH]) for x, y in tables.PLACES.values()]
+    places = [np.array([x * tables.RADIUS, y * tables.RADIUS, tables.DEPTH]) for x, y in tables.POSITIONS.values()]
     robot = checker.problem.robot
     sets = [(place, accessible(robot, place, options.definition, tables.DIVISIONS).angles) for place in places]
     print(f"accessible: {time.perf_counter() - began:.1f} s since the start")
     found = tables.attained(checker, sets)
-    for name, good in zip(tables.PLACES, found, strict=True):
+    for name, good in zip(tables.POSITIONS, found, strict=True):
         print(f"{name:9s} {len(good):6d} accessible, {good.sum():6d} attainable, {100.0 * good.mean():6.2f} %")
     print(f"attainable: {time.perf_counter() - began:.1f} s since the start")
     motions = sum(map(len, found)) * VALUES * tables.MAX_ARCS

@@ -46,8 +46,8 @@ def main() -> None:
         start = time.perf_counter()
         Run(sweep, directory).go(executor)
         resume = time.perf_counter() - start
-    stored = sum(8 if name not in ("arcs", "verdict", "tried_arcs") else 2 for name in sweep.store) * sweep.grid.size
-    print(f"{sweep.grid.size} cells in {whole:.2f} s, {executor.seconds:.2f} s of it computing")
+    stored = sum(8 if name not in ("arcs", "verdict", "tried_arcs") else 2 for name in sweep.store) * sweep.grid.n_cells
+    print(f"{sweep.grid.n_cells} cells in {whole:.2f} s, {executor.seconds:.2f} s of it computing")
     print(f"the store took {whole - executor.seconds:.2f} s, {100 * (1 - executor.seconds / whole):.1f} % of the whole")
     print(f"{size / 1e6:.1f} MB on disk, {stored / 1e6:.1f} MB of data")
     print(f"a finished run is recognised in {again:.3f} s; all shards checked and copied again in {resume:.2f} s")

@@ -9,15 +9,15 @@ from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.keys.obstacles import ObstacleTable
 from cspr_jax.config.keys.path import PathTable, TargetPath
-from cspr_jax.config.plan import DepthRule, PlanFile
 from cspr_jax.config.keys.pose import Pose
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable, SweepFile, SweepTrajectory
 from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.keys.workspace import WorkspaceTable
+from cspr_jax.config.plan import DepthRule, PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable, SweepFile, SweepTrajectory
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.plan_fields import CHECK, LAUNCH, SCATTER, SECTION, SEGMENT, WHOLE
+from cspr_jax.schema.plan_fields import CHECK, LAUNCH, PLAN_OBJECT, SCATTER, SECTION, SEGMENT
 from cspr_jax.schema.quantities import (
     ACROSS,
     AXES,
@@ -197,7 +197,7 @@ def plan_text() -> str:
         tables, Markdown.
     """
     tables = {
-        "The object:\n\n": WHOLE,
+        "The object:\n\n": PLAN_OBJECT,
         "Each of `segments`:\n\n": SEGMENT,
         "Each of the `sections` of a path:\n\n": SECTION,
         "`launch`:\n\n": LAUNCH,

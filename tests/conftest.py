@@ -90,7 +90,7 @@ def pytest_configure(config):
         given = os.environ.get("XLA_FLAGS", "").split()
         place = COMPILED / jaxlib.version.__version__
         place.mkdir(parents=True, exist_ok=True)
-        cheap = xla.known_flags(place, [flag for flag in CHEAP if flag not in given])
+        cheap = xla.accepted_flags(place, [flag for flag in CHEAP if flag not in given])
         os.environ["XLA_FLAGS"] = " ".join([*cheap, *given])
         batches.LARGEST = LARGEST_BATCH
     elif config.option.markexpr.startswith("soak"):

@@ -18,9 +18,9 @@ from cspr_jax.api.notebooks import Displayed
 from cspr_jax.api.plans import Plan
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
-from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.text import TooLongError
-from cspr_jax.config.plan import PlanFile, plan_keys
+from cspr_jax.config.plan import PlanFile, checked_plan
+from cspr_jax.config.reading import json_text
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import reference_of, samples_of
 from cspr_jax.curves.spline import Spline
@@ -145,7 +145,7 @@ class Check(Displayed):
         """
         with double_precision():
             if not self.plan.legs[0].motions:
-                raise InputError("slower", None, "absent: the motion is too long to be held", fault="asked for")
+                raise InputError("slower", None, "absent: the motion is too long to be held", problem="asked for")
             motion = cast(Spline, self.plan.legs[0].motions[0])
             if not hasattr(motion, "stretched") or not hasattr(motion, "bounds"):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
@@ -155,7 +155,7 @@ class Check(Displayed):
             if not np.isfinite(minimum.factor):
                 return Stretched(np.nan, minimum.is_static, None)
             factor = minimum.factor * (self.plan.keys.stretch or 1.0)
-            text = text_of(json.loads(self.plan.text) | {"stretch": factor})
+            text = json_text(json.loads(self.plan.text) | {"stretch": factor})
             return Stretched(
                 minimum.factor,
                 minimum.is_static,
@@ -254,14 +254,14 @@ def check(  # noqa: PLR0913
     with double_precision():
         if isinstance(times, str | Path):
             return check_file(Path(times), keys)
-        plan = plan_keys(keys, NAME)
+        plan = checked_plan(keys, NAME)
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
         elif hasattr(times, "state") or _is_curve(times):
             source = times
         else:
             source = _function(times, duration, plan)
-        return _check_of(plan.with_source(str(NAME), source), text_of(keys))
+        return _check_of(plan.with_source(str(NAME), source), json_text(keys))
 
 
 def _is_curve(times: Any) -> bool:
@@ -276,7 +276,7 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
         kind = "a file" if is_file else "a motion" if is_motion else "a curve or a function"
         for name in (name for name, rows in samples.items() if rows is not None):
             error = f"given beside {kind} in place of times"
-            raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", fault=error)
+            raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", problem=error)
     if duration is not None and (is_file or is_motion or _is_curve(times) or not callable(times)):
         raise InputError("duration", duration, "absent but for a function of time")
 
@@ -287,14 +287,14 @@ def check_file(
     """Check the motion of a file."""
     with double_precision():
         data = {"schema": 1, "family": "spline", **keys, "motion": str(motion)}
-        plan = plan_keys(data, motion)
+        plan = checked_plan(data, motion)
         try:
-            return _check_of(plan, text_of(data))
+            return _check_of(plan, json_text(data))
         except TooLongError as error:
             if outputs:
                 held = f"must be absent: {motion} is too long to be held, and judged in windows"
                 raise ConfigError(outputs[0], held) from error
-            return _shown(long_plan(plan, motion), text_of(data))
+            return _shown(long_plan(plan, motion), json_text(data))
         except ConfigError as error:
             raise _of_file(error, motion, limits) from error
 
@@ -321,9 +321,9 @@ def _shown(planned: planning.PlannedMotions, text: str) -> Check:
 
 def _function(function: Any, duration: float | None, keys: PlanFile) -> Placed[FunctionMotion]:
     if not callable(function):
-        raise InputError("positions", None, "must be given beside times: (n, 3) m", fault="missing")
+        raise InputError("positions", None, "must be given beside times: (n, 3) m", problem="missing")
     if duration is None:
-        raise InputError("duration", None, "must be given beside a function: s", fault="missing")
+        raise InputError("duration", None, "must be given beside a function: s", problem="missing")
     file = resolve_robot(keys.robot, NAME, Path())
     frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, keys, NAME))
     motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)

@@ -14,7 +14,7 @@ from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.spline import SplineBatch
@@ -89,7 +89,7 @@ def check_many(
     Raises:
         InputError: samples that make no motion, or an impossible argument.
     """
-    keys = plan_keys(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
+    keys = checked_plan(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
     samples_of_all = (positions, quaternions, velocities, accelerations)
     columns = [None if column is None else np.asarray(column) for column in samples_of_all]
     others = {"times": times, "quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
@@ -110,7 +110,9 @@ def check_many(
                 curve = kept_to(file.own_pattern, source_spline(samples, **settings), is_planar=False)
                 motions.append(placed_inward(curve, axes, reference))
             except InputError as error:
-                raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
+                raise InputError(
+                    f"motion {i}, {error.key}", error.value, error.allowed, problem=error.problem
+                ) from error
         several, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
         proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
         answers = with_attained(problem, answers_of(proofs, several.durations), motions, scene)
@@ -127,4 +129,4 @@ def _check_shapes(count: int, rows: int, shapes: dict[str, tuple[int, ...]]) -> 
         if shape not in fitting:
             shapes_in_words = " or ".join(map(str, fitting))
             words = f"must have shape {shapes_in_words}, as positions of {count} motions at {rows} times each"
-            raise InputError(name, None, words, fault=f"shape {shape}")
+            raise InputError(name, None, words, problem=f"shape {shape}")

@@ -11,8 +11,8 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed, plan_summary
-from cspr_jax.config.mappings import plain, text_of
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
+from cspr_jax.config.reading import json_text, plain_values
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.arguments import File
 from cspr_jax.launch.landings import LaunchErrors, Scatter
@@ -176,7 +176,7 @@ class Plan(Displayed, planning.PlannedMotions):
         Raises:
             StoreError: numbers that no motion file has.
         """
-        from cspr_jax.outputs.path_columns import path_columns  # plans load no results
+        from cspr_jax.outputs.paths import path_columns  # plans load no results
         from cspr_jax.store.reading.result import motion_result
 
         with double_precision():
@@ -267,9 +267,9 @@ def plan(given: File) -> Plan:
     """
     with double_precision():
         if isinstance(given, Mapping):
-            data = plain(given)
-            planned = planning.plan_of(plan_keys(data, NAME), NAME)
-            text = text_of(data)
+            data = plain_values(given)
+            planned = planning.plan_of(checked_plan(data, NAME), NAME)
+            text = json_text(data)
         else:
             planned = planning.plan(Path(given))
             text = planned.text

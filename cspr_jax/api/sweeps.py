@@ -16,7 +16,7 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import ResultOrPath, checked
 from cspr_jax.api.notebooks import Displayed
-from cspr_jax.config.mappings import plain, text_of
+from cspr_jax.config.reading import json_text, plain_values
 from cspr_jax.errors import ConfigError
 from cspr_jax.errors.arguments import AnyInteger, File, PathNames, TileRange
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
@@ -139,7 +139,7 @@ class Job:
             robot = self.sweep.robot
             from cspr_jax.config.hints import robot_hints, sweep_hints  # with the keys of plans, which take time
 
-            for line in [*robot_hints(robot), *sweep_hints(self.sweep.keys, robot)]:
+            for line in [*robot_hints(robot), *sweep_hints(self.sweep.spec, robot)]:
                 self.hooks.warn(f"hint: {line}")
             return self._run.go(executor).result
 
@@ -169,8 +169,8 @@ def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
     """A sweep, checked without computing anything."""
     if not isinstance(source, Mapping):
         return read_sweep(Path(source))
-    data = plain(source)
-    return sweep_of(data, NAME, text=text_of(data))
+    data = plain_values(source)
+    return sweep_of(data, NAME, text=json_text(data))
 
 
 @checked()

@@ -36,7 +36,7 @@ from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.statics.kernel_axes import centred, prepared
 from cspr_jax.robots.statics.wrench_sets import Faces, spanning
 from cspr_jax.schema.verdicts import FLAGS
-from cspr_jax.workspaces.acceleration_search import faces_of, judged
+from cspr_jax.workspaces.acceleration_search import faces_of, margins_and_verdicts
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CONDITIONS, FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
@@ -136,7 +136,7 @@ def _poses(robot, frame: Frame, places: np.ndarray, orientations, point: str) ->
     inner, turns = np.asarray(frame.inward(places)), None
     if orientations is not None:
         if not row.is_body:
-            raise InputError("orientations", None, "must be None", fault="a point mass has none")
+            raise InputError("orientations", None, "must be None", problem="a point mass has none")
         unit_quaternions = quaternions("orientations", orientations, len(places))
         if row.is_planar and unit_quaternions[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
@@ -208,7 +208,7 @@ def sensitivity(
     places = points_of("positions", positions)
     check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
     if orientations is not None and isinstance(robot, PointMassRobot):
-        raise InputError("orientations", None, "must be None", fault="a point mass has none")
+        raise InputError("orientations", None, "must be None", problem="a point mass has none")
     with double_precision():
         centred_robot, frame = centred(robot)
         turns = None
@@ -303,7 +303,9 @@ class AvailableAccelerations:
             raise InputError("accelerations", "y not 0", "y = 0: the plane of a planar robot")
         rotated = np.asarray(self._frame.rotated(np.broadcast_to(vectors, self.positions.shape)))
         with double_precision():
-            return judged(self._robot, self._faces, self._allowed, self._frame.inward(self.positions), rotated)
+            return margins_and_verdicts(
+                self._robot, self._faces, self._allowed, self._frame.inward(self.positions), rotated
+            )
 
 
 @checked(instead=TENSIONS)

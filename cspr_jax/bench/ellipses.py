@@ -25,7 +25,7 @@ class EllipseWork(NamedTuple):
 
     Fields:
         hull: of the spools.
-        ellipse: leaves (n, 3) m.
+        ellipse: arrays (n, 3) m.
         frequency: (n,) rad/s.
     """
 
@@ -65,8 +65,8 @@ def numpy_intervals(case: EllipseWork) -> Float[np.ndarray, "2 n"]:
 def _numpy_terms(case: EllipseWork) -> tuple[np.ndarray, ...]:
     # constant, tilting and pulling (..., n, n_edges), depth and swing (n,).
     edges, normal = np.asarray(case.hull.edges), np.asarray(case.hull.normal)
-    flat = [leaf[:, :2] @ edges.T for leaf in case.ellipse]
-    depth, *swing = (leaf @ normal for leaf in case.ellipse)
+    flat = [vector[:, :2] @ edges.T for vector in case.ellipse]
+    depth, *swing = (vector @ normal for vector in case.ellipse)
     constant = 1.0 + flat[0]
     tilting = constant * (np.stack(swing) / depth)[..., None]
     return constant, tilting, np.stack(flat[1:]) - tilting, depth, np.hypot(*swing)

@@ -81,9 +81,9 @@ def _compiled(source: Path) -> Callable:
 def _lined(values) -> np.ndarray:
     # Whole vectors of float32, at the start of a cache line.
     array = np.ascontiguousarray(values, np.float32)
-    device_batch_size = np.zeros(array.size + ALIGNED // 4, np.float32)
-    first = -device_batch_size.ctypes.data % ALIGNED // 4
-    lined = device_batch_size[first : first + array.size].reshape(array.shape)
+    buffer = np.zeros(array.size + ALIGNED // 4, np.float32)
+    first = -buffer.ctypes.data % ALIGNED // 4
+    lined = buffer[first : first + array.size].reshape(array.shape)
     lined[...] = array
     return lined
 
@@ -125,7 +125,7 @@ def _six_cables(kernel: Callable, work: six_cables.SixCableWork) -> float:
         table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
         inputs = [_lined(np.concatenate(fields)), _lined(table)]
         out = _lined(np.zeros(six_cables.LANES))
-        numbers = ctypes.c_float(six_cables.PLACE[2]), ctypes.c_float(float(robot.gravity))
+        numbers = ctypes.c_float(six_cables.TARGET[2]), ctypes.c_float(float(robot.gravity))
         sizes = ctypes.c_size_t(six_cables.LANES), ctypes.c_int(len(tau))
         calls.append(partial(kernel, *_pointers(*inputs, *constants, joint), *numbers, *sizes, *_pointers(out)))
         buffers.append((inputs, out))

@@ -18,7 +18,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 
-DURATION, PLACES = 10.0, 7  # s; way-points of a motion
+DURATION, WAYPOINTS = 10.0, 7  # s; way-points of a motion
 ROWS, TOGETHER = 10_001, 100  # of a record; motions that are judged together
 
 
@@ -28,14 +28,14 @@ class Region(NamedTuple):
     Fields:
         robot: name in the catalogue.
         middle: of the way-points, from the centroid of the spools, z down, m.
-        reach: largest distance of each coordinate from the middle, m.
+        radius: largest distance of each coordinate from the middle, m.
         tilt: largest component of the quaternions' vectors; 0 for a point mass.
         tensions: least and largest, N.
     """
 
     robot: str
     middle: tuple[float, float, float]
-    reach: float
+    radius: float
     tilt: float
     tensions: tuple[float, float]
 
@@ -53,14 +53,14 @@ def problem(region: Region) -> Problem:
 
 def poses(region: Region, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray | None]:
     """Random poses in a region."""
-    places = np.array(region.middle) + region.reach * rng.uniform(-1.0, 1.0, (PLACES, 3))
-    turns = np.concatenate([np.ones((PLACES, 1)), region.tilt * rng.uniform(-1.0, 1.0, (PLACES, 3))], axis=1)
-    return places, turns if region.tilt else None
+    positions = np.array(region.middle) + region.radius * rng.uniform(-1.0, 1.0, (WAYPOINTS, 3))
+    turns = np.concatenate([np.ones((WAYPOINTS, 1)), region.tilt * rng.uniform(-1.0, 1.0, (WAYPOINTS, 3))], axis=1)
+    return positions, turns if region.tilt else None
 
 
 def _motion(region: Region, rng: np.random.Generator) -> Spline:
     # Quintic spline through random poses.
-    return interpolated(np.linspace(0.0, DURATION, PLACES), *poses(region, rng), interpolation="quintic")
+    return interpolated(np.linspace(0.0, DURATION, WAYPOINTS), *poses(region, rng), interpolation="quintic")
 
 
 def _decided(proofs: list[MotionProof]) -> None:
@@ -71,17 +71,17 @@ def _decided(proofs: list[MotionProof]) -> None:
 
 def record_rate() -> float:
     """Records of three cables that are interpolated and proved a second, each of `ROWS` rows."""
-    judged, spline = problem(THREE), _motion(THREE, np.random.default_rng(0))
+    case, spline = problem(THREE), _motion(THREE, np.random.default_rng(0))
     times = np.linspace(0.0, DURATION, ROWS)
-    places = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
-    return 1.0 / best(lambda: _decided([proof_of(judged, interpolated(times, places))]))
+    positions = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
+    return 1.0 / best(lambda: _decided([proof_of(case, interpolated(times, positions))]))
 
 
 def together_rate() -> float:
     """Motions of eight cables that are judged a second, `TOGETHER` at once."""
-    judged, rng = problem(EIGHT), np.random.default_rng(0)
-    several = SplineBatch([_motion(EIGHT, rng) for _ in range(TOGETHER)])
-    prove = partial(proofs_of, judged, several.bounds, several.durations, jumps=several.jumps)
+    case, rng = problem(EIGHT), np.random.default_rng(0)
+    splines = SplineBatch([_motion(EIGHT, rng) for _ in range(TOGETHER)])
+    prove = partial(proofs_of, case, splines.bounds, splines.durations, jumps=splines.jumps)
     return TOGETHER / best(lambda: _decided(prove()))
 
 

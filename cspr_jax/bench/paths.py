@@ -13,15 +13,15 @@ from cspr_jax.families.paths.least_time.jumping import jumping_motions
 # Paths that are solved together; cells of each.
 TOGETHER, CELLS = 64, 500
 # Splines go beyond their points: at rest the tensions are to be within their limits there too.
-REGIONS = {"3 cables": motions.THREE._replace(reach=0.06), "8 cables": motions.EIGHT}
+REGIONS = {"3 cables": motions.THREE._replace(radius=0.06), "8 cables": motions.EIGHT}
 
 
 def _section(region: motions.Region, rng: np.random.Generator) -> Section:
     # A cubic spline through random poses, over the length of their polygon.
-    places, turns = motions.poses(region, rng)
-    marks = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    curve = interpolated(marks, places, turns, ends="natural")
-    return Section(curve, np.full(len(marks) - 1, np.inf), marks)
+    positions, turns = motions.poses(region, rng)
+    knots = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
+    curve = interpolated(knots, positions, turns, ends="natural")
+    return Section(curve, np.full(len(knots) - 1, np.inf), knots)
 
 
 def rate(region: motions.Region) -> float:

@@ -1,6 +1,6 @@
 """Six-cable checks: the six tensions and the sign of the determinant at one tau of one transition from rest.
 
-The MSSM goes to one place with random orientations, numbers of arcs and beta-hat. The NumPy version computes the
+The MSSM goes to one position with random orientations, numbers of arcs and beta-hat. The NumPy version computes the
 printed formulas, (3.1) to (3.11), (3.44) and (3.80), on whole arrays, and solves with `np.linalg.solve`.
 """
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128
 FEWEST_ARCS, MOST_ARCS = 4, 15
-PLACE = (1.5 * 0.86, 0.0, 1.7)
+TARGET = (1.5 * 0.86, 0.0, 1.7)
 FROM_REST, QUINTIC = PlatformMotionKind(from_rest=True), amplitudes.named("quintic")
 
 
 class SixCableWork(NamedTuple):
-    """Transitions from rest, all to `PLACE`.
+    """Transitions from rest, all to `TARGET`.
 
     Fields:
         robot: the MSSM.
@@ -71,7 +71,7 @@ class Batch(NamedTuple):
     Fields:
         arcs: how many.
         real: how many segments are not padding.
-        segments: leaves (lanes, ...), on the device.
+        segments: arrays (lanes, ...), on the device.
     """
 
     arcs: int
@@ -96,11 +96,11 @@ def batches(work: SixCableWork) -> list[Batch]:
 
 @jax.jit
 def _segments(robot: PlatformRobot, odd, items) -> PlatformSegment:
-    depth = jnp.asarray(PLACE[2])
+    depth = jnp.asarray(TARGET[2])
     rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array(IDENTITY)
 
     def one(quaternion, beta_hat):
-        return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (beta_hat, beta_hat), odd=odd)
+        return pose_segment(robot, rest, (jnp.asarray(TARGET), quaternion), depth, (beta_hat, beta_hat), odd=odd)
 
     return jax.vmap(one)(*items)
 
@@ -146,21 +146,21 @@ def _numpy_checks(task: SixCableWork) -> np.ndarray:
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
     a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2
     gravity, sign = float(task.robot.gravity), (-1.0) ** task.arcs[:, None]
-    squared = theta**2 * PLACE[2] / gravity
+    squared = theta**2 * TARGET[2] / gravity
     c, s, c3, s3 = np.cos(theta * tau), np.sin(theta * tau), np.cos(3 * theta * tau), np.sin(3 * theta * tau)
     h = task.beta_hat[:, None]
-    beat = ((9 + h) * c - (1 + h) * c3) / 8
-    beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
+    law = ((9 + h) * c - (1 + h) * c3) / 8
+    law1, law2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
     signed_angle = (sign * task.angle[:, None])[..., None]
-    angle = signed_angle * (a * beat)[..., None]
+    angle = signed_angle * (a * law)[..., None]
     angular_speed, angular_acceleration = (
-        signed_angle * (a1 * beat + a * beat1)[..., None],
-        signed_angle * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None],
+        signed_angle * (a1 * law + a * law1)[..., None],
+        signed_angle * (a2 * law + 2 * a1 * law1 + a * law2)[..., None],
     )
-    reach = (sign * (a * c - a1 * s / theta))[..., None]
-    pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
-    rest, far = rest_point(PLACE[2]), np.array([*PLACE[:2], 0.0])
-    position, acceleration = rest + reach * far, pull * far - np.array([0.0, 0.0, gravity])
+    fraction = (sign * (a * c - a1 * s / theta))[..., None]
+    fraction_acceleration = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
+    rest, far = rest_point(TARGET[2]), np.array([*TARGET[:2], 0.0])
+    position, acceleration = rest + fraction * far, fraction_acceleration * far - np.array([0.0, 0.0, gravity])
     e = task.axis[:, None, :]
     skew = np.cross(np.eye(3), task.axis[:, None, :])[:, None]
     rotation = np.eye(3) + np.sin(angle)[..., None] * skew + (1 - np.cos(angle))[..., None] * skew @ skew

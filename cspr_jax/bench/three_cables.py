@@ -34,7 +34,7 @@ class ThreeCableWork(NamedTuple):
     Fields:
         problem: robot and amplitude function.
         ends: (n, 3) m.
-        segments: for even numbers of arcs and for odd ones, leaves (n, ...).
+        segments: for even numbers of arcs and for odd ones, arrays (n, ...).
     """
 
     problem: Problem
@@ -56,7 +56,7 @@ def work() -> ThreeCableWork:
 
 
 def rate(work: ThreeCableWork, dtype: str) -> float:
-    """Checks a second of the sieve."""
+    """Checks a second of the screen."""
     pair = jax.tree.map(lambda x: np.asarray(x, dtype), work.segments)
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
@@ -89,7 +89,7 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     across = v2 - (v2 @ q1)[:, None] * q1
     q2 = across / np.linalg.norm(across, axis=1)[:, None]
     psi = np.arctan2(np.linalg.norm(across, axis=1), v2 @ q1)[:, None]
-    r, slope, curve = r1 + (r2 - r1) * amplitude[0], (r2 - r1) * amplitude[1], (r2 - r1) * second_derivative
+    r, radial_rate, curve = r1 + (r2 - r1) * amplitude[0], (r2 - r1) * amplitude[1], (r2 - r1) * second_derivative
     smallest = []
     for p in range(1, MAX_ARCS + 1):
         theta = psi + (-1) ** (p - 1) * 2.0 * math.pi * math.ceil((p - 1) / 2)  # (2.34)
@@ -101,18 +101,21 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
         u1, v1d = -k * (ss + sf), k * (cs - cf)
         u2, v2d = -k * theta * (cs + (n - 1.0) * cf), -k * theta * (ss - (n - 1.0) * sf)
         rate = g / Z0 / (theta**2 * (n - 1.0))  # 1 / T^2
-        along, side = rate * (curve * u + 2 * slope * u1 + r * u2), rate * (curve * v + 2 * slope * v1d + r * v2d)
-        place = [center[i] + q1[i] * (r * u) + q2[:, i, None] * (r * v) for i in range(3)]
+        along, side = (
+            rate * (curve * u + 2 * radial_rate * u1 + r * u2),
+            rate * (curve * v + 2 * radial_rate * v1d + r * v2d),
+        )
+        position = [center[i] + q1[i] * (r * u) + q2[:, i, None] * (r * v) for i in range(3)]
         force = [q1[i] * along + q2[:, i, None] * side - (g if i == 2 else 0.0) for i in range(3)]
-        smallest.append(np.min([_kappa(base, k, place, force).min(1) for k in range(3)], axis=0))
+        smallest.append(np.min([_kappa(base, k, position, force).min(1) for k in range(3)], axis=0))
     return np.stack(smallest, axis=1)
 
 
-def _kappa(base: np.ndarray, k: int, place: list, force: list) -> np.ndarray:
+def _kappa(base: np.ndarray, k: int, position: list, force: list) -> np.ndarray:
     after, before = base[(k + 1) % 3], base[(k + 2) % 3]
     d, c = after - before, np.cross(after, before)
     return (
-        (place[1] * d[2] - place[2] * d[1] + c[0]) * force[0]
-        + (place[2] * d[0] - place[0] * d[2] + c[1]) * force[1]
-        + (place[0] * d[1] - place[1] * d[0] + c[2]) * force[2]
+        (position[1] * d[2] - position[2] * d[1] + c[0]) * force[0]
+        + (position[2] * d[0] - position[0] * d[2] + c[1]) * force[1]
+        + (position[0] * d[1] - position[1] * d[0] + c[2]) * force[2]
     )

@@ -34,11 +34,11 @@ class SamplePoses(NamedTuple):
     """Random poses among the spools, as lanes.
 
     Fields:
-        place: three arrays (n,), of the mass centre, m.
+        position: three arrays (n,), of the mass centre, m.
         quaternion: four arrays (n,), unit quaternions; None of a point mass.
     """
 
-    place: tuple[np.ndarray, ...]
+    position: tuple[np.ndarray, ...]
     quaternion: tuple[np.ndarray, ...] | None
 
 
@@ -51,8 +51,8 @@ def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> Sam
     def lanes(array):
         return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
-    place = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
-    return SamplePoses(place, lanes(quaternions) if isinstance(robot, PlatformRobot) else None)
+    position = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
+    return SamplePoses(position, lanes(quaternions) if isinstance(robot, PlatformRobot) else None)
 
 
 def _four_cables() -> PointMassRobot:
@@ -80,16 +80,16 @@ def margin_rate(
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, condition, robot.limits))
     numbers = np.dtype(dtype).type
-    kernel, size = search.kernel(numbers, by_null_space=by_null_space), device_batch_size(search.batch(numbers))
-    all_poses = _poses(centred_robot, batches * size, dtype)
+    kernel, n_poses = search.kernel(numbers, by_null_space=by_null_space), device_batch_size(search.batch(numbers))
+    all_poses = _poses(centred_robot, batches * n_poses, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], all_poses)) for i in range(batches)]
 
     def one(poses):
-        return jax.block_until_ready(kernel(poses.place, poses.quaternion, None))
+        return jax.block_until_ready(kernel(poses.position, poses.quaternion, None))
 
     one(parts[0])
     first = time.perf_counter() - start
-    return batches * size / best(partial(in_threads, one, parts)), first
+    return batches * n_poses / best(partial(in_threads, one, parts)), first
 
 
 def clearance_rate(dtype: str) -> float:
@@ -100,15 +100,15 @@ def clearance_rate(dtype: str) -> float:
     among = scene(robot, diameter=0.01)
     of_robot = clearance_kernels.Points(*map(as_float64, (among.base_points, among.platform_points, among.diameters)))
     points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
-    size, pairs = device_batch_size(PAIRS_BATCH), np.array(among.pairs, np.int32)
-    all_poses = _poses(robot, 4 * size, dtype)
+    n_poses, pairs = device_batch_size(PAIRS_BATCH), np.array(among.pairs, np.int32)
+    all_poses = _poses(robot, 4 * n_poses, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], all_poses)) for i in range(4)]
 
     def one(poses):
-        lanes = clearance_kernels.PoseLanes(poses.place, poses.quaternion, None)
+        lanes = clearance_kernels.PoseLanes(poses.position, poses.quaternion, None)
         return jax.block_until_ready(clearance_kernels.of_cables(points, lanes, pairs))
 
-    return 4 * size / best(partial(in_threads, one, parts))
+    return 4 * n_poses / best(partial(in_threads, one, parts))
 
 
 def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
@@ -117,9 +117,9 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, count, "float64")
-    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
-    wrenches = np.repeat(search.required(places[0], quaternions[0]).corners, count, axis=0)
+    positions, quaternions = np.stack(poses.position, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, positions, quaternions)) / search.unit[:, None]
+    wrenches = np.repeat(search.required(positions[0], quaternions[0]).corners, count, axis=0)
     limits = [
         np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.requirement.low, search.requirement.high)
     ]
@@ -152,13 +152,13 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, SAMPLE, "float64")
-    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
-    wrench = search.required(places[0], quaternions[0]).corners[0]
+    positions, quaternions = np.stack(poses.position, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, positions, quaternions)) / search.unit[:, None]
+    wrench = search.required(positions[0], quaternions[0]).corners[0]
 
-    def rate(way) -> float:
+    def rate(decide) -> float:
         low, high = search.requirement.low, search.requirement.high
-        return SAMPLE / best(lambda: [way(matrix, wrench, low, high) for matrix in matrices])
+        return SAMPLE / best(lambda: [decide(matrix, wrench, low, high) for matrix in matrices])
 
     return {"HiGHS": rate(by_program), "NNLS": rate(by_squares)}
 

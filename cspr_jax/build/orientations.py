@@ -26,10 +26,10 @@ def orientations(
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> Float[np.ndarray, "4"]:
     """An orientation given as a quaternion, which may miss length 1 by rounding."""
     unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
-    size = float(np.linalg.norm(unit_quaternion))
-    if abs(size - 1.0) > UNIT_NORM:
-        raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
-    return unit_quaternion / size
+    norm = float(np.linalg.norm(unit_quaternion))
+    if abs(norm - 1.0) > UNIT_NORM:
+        raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {norm:.7g})")
+    return unit_quaternion / norm
 
 
 def pose_quaternions(waypoints: Waypoints, points: Float[np.ndarray, "n_poses 3"]) -> Float[np.ndarray, "n_poses 4"]:

@@ -1,7 +1,6 @@
 """Problems for the kernels, built from checked files: robot, limits, amplitude function."""
 
-from cspr_jax.build.limits import build_limits
-from cspr_jax.build.robots import is_redundant_platform, kernel_robot
+from cspr_jax.build.robots import build_limits, is_redundant_platform, kernel_robot
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.config.robot import RobotFile
@@ -17,10 +16,10 @@ from cspr_jax.schema.families import FAMILIES
 
 
 def build_amplitude(
-    keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "", for_bounds: bool = False
+    spec: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "", for_bounds: bool = False
 ) -> Amplitude:
     """The amplitude function, its boundary conditions checked."""
-    key = keys.amplitude
+    key = spec.amplitude
     if isinstance(key, PolynomialAmplitude):
         amplitude, text = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
     elif isinstance(key, NamedAmplitude):
@@ -30,7 +29,7 @@ def build_amplitude(
         amplitude, text = amplitudes.named(key.name, value), shown(key.name)
     else:
         amplitude, text = amplitudes.named(key), shown(key)
-    free_end = all(FAMILIES[name].free_end for name in keys.families)
+    free_end = all(FAMILIES[name].free_end for name in spec.families)
     broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
     if broken:
         conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
@@ -40,7 +39,7 @@ def build_amplitude(
 
 def build_problem(
     robot_file: RobotFile,
-    keys: TrajectoryKeys,
+    spec: TrajectoryKeys,
     limits: LimitTable,
     file: object,
     *,
@@ -51,19 +50,19 @@ def build_problem(
     pulleys: bool = False,
 ) -> Problem:
     """Robot, limits and amplitude function of a plan or sweep, as the kernels take them."""
-    amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
+    amplitude = build_amplitude(spec, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     limit_values = build_limits(robot_file, limits, file)
-    pulleys = pulleys or all(FAMILIES[name].knows_pulleys for name in keys.families)
-    robot = kernel_robot(robot_file, keys, file, any_cables=any_cables, pulleys=pulleys)
+    pulleys = pulleys or all(FAMILIES[name].knows_pulleys for name in spec.families)
+    robot = kernel_robot(robot_file, spec, file, any_cables=any_cables, pulleys=pulleys)
     try:
         if not is_redundant_platform(robot):
             check_bounded(limit_values)
-        check_certain(robot, limit_values, keys.families, in_pairs=robot_file.pairs is not None)
+        check_certain(robot, limit_values, spec.families, in_pairs=robot_file.pairs is not None)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, limit_values, amplitude)
 
 
-def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMotionKind:
+def motion_kind(spec: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMotionKind:
     """Kind of the motions of a platform."""
-    return PlatformMotionKind(variable=keys.family == "hypocycloid", plain=keys.beat == "beta_1", from_rest=from_rest)
+    return PlatformMotionKind(variable=spec.family == "hypocycloid", plain=spec.beat == "beta_1", from_rest=from_rest)

@@ -1,17 +1,17 @@
-"""Robots for the kernels, built from checked files."""
+"""Robots and limits for the kernels, built from checked files."""
 
 from pathlib import Path
 from typing import Any, Literal, overload
 
 import numpy as np
 
-from cspr_jax.build.limits import build_limits
 from cspr_jax.config.keys.limits import LimitKeys
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motion.given_limits import check_bounded
+from cspr_jax.motion.given_limits import check_bounded, limits_of, pair_limits
 from cspr_jax.robots.cables import with_cables
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.model.point_mass import STANDARD_GRAVITY, PointMassRobot, point_mass_robot
 from cspr_jax.robots.model.robot import MOVED, check_moved
@@ -48,15 +48,25 @@ PlatformName = Literal[
 ]
 
 
-def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
+def build_limits(robot_file: RobotFile, spec: LimitKeys, file: object) -> Limits:
+    """Limits of the file, with those of the robot where it gives none."""
+    pairs = robot_file.pairs
+    try:
+        limits = limits_of(robot_file, vars(spec), vars(robot_file), "", len(robot_file.as_written.base_points))
+        return limits if pairs is None else pair_limits(limits, pairs)
+    except InputError as error:
+        raise ConfigError(file, str(error)) from error
+
+
+def gravity_of(robot_file: RobotFile, spec: TrajectoryKeys) -> float:
     """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2."""
-    return keys.gravity or robot_file.gravity or STANDARD_GRAVITY
+    return spec.gravity or robot_file.gravity or STANDARD_GRAVITY
 
 
-def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot | PlatformRobot:
+def build_robot(robot_file: RobotFile, spec: TrajectoryKeys, file: object) -> PointMassRobot | PlatformRobot:
     """The robot of a file, in its own axes and with its own limits."""
     settings: dict[str, Any] = {name: getattr(robot_file, name) for name in ("mass", "name", "z_axis")}
-    settings |= {"gravity": gravity_of(robot_file, keys), "limits": build_limits(robot_file, LimitKeys(), file)}
+    settings |= {"gravity": gravity_of(robot_file, spec), "limits": build_limits(robot_file, LimitKeys(), file)}
     settings |= {"pattern": robot_file.own_pattern}
     try:
         if not robot_file.is_platform:
@@ -95,11 +105,11 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
 
 
 def kernel_robot(
-    robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False, pulleys: bool = False
+    robot_file: RobotFile, spec: TrajectoryKeys, file: object, *, any_cables: bool = False, pulleys: bool = False
 ) -> Any:
     """The robot of a file, as the kernels take it; a platform's axes are still those of the file."""
-    robot: Any = build_robot(robot_file, keys, file)
-    place, key = robot_file.placed("base_points", file)
+    robot: Any = build_robot(robot_file, spec, file)
+    source, key = robot_file.placed("base_points", file)
     try:
         # Families that move robots on any number of cables move the patterns that their rows name.
         if robot.pattern in MOVED or not any_cables:
@@ -107,17 +117,17 @@ def kernel_robot(
         if not is_redundant_platform(robot):
             check_bounded(robot.limits)
     except InputError as error:
-        raise ConfigError(place, key.removesuffix("base_points") + str(error)) from error
+        raise ConfigError(source, key.removesuffix("base_points") + str(error)) from error
     if robot.n_cables != robot.dof and not any_cables:
         raise ConfigError(
-            place,
-            f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
+            source,
+            f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{spec.family}" '
             "(it does not exist yet for more cables than degrees of freedom)",
         )
     return centred(robot)[0]
 
 
-def fault_at_rest(robot_file: RobotFile) -> str | None:
+def error_at_rest(robot_file: RobotFile) -> str | None:
     """Reason why a robot cannot hang still in its reference orientation, if it cannot."""
     robot_file = robot_file.equivalent() if robot_file.translation_only else robot_file
     try:

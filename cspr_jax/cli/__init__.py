@@ -15,7 +15,7 @@ from cspr_jax.cli import checks, listings, pictures, plans, published, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
 from cspr_jax.outputs.plots.style.options import with_widths
-from cspr_jax.runtime import compile_cache, surroundings, terminal
+from cspr_jax.runtime import compile_cache, process_environment, terminal
 from cspr_jax.sweep.signals import Prompt, prompt_end
 
 EPILOGUE = (
@@ -47,15 +47,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     environment = dict(os.environ)
     if arguments is None:
         gc.set_threshold(*FEWER_COLLECTIONS)
-        surroundings.settle()
+        process_environment.configure()
     _mend_streams()
     if sys.platform == "win32":
         sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
         return int(ExitCode.BAD_INPUT)
     try:
         options = _parser().parse_args(with_widths(sys.argv[1:] if arguments is None else arguments))
-        surroundings.check_threads()
-        surroundings.check_matplotlibrc()
+        process_environment.check_threads()
+        process_environment.check_matplotlibrc()
     except SystemExit as end:
         raise SystemExit(_flushed(int(end.code or 0))) from end
     except BrokenPipeError:
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with prompt_end(compile_cache.hand_over if arguments is None else None) as prompt:
         code = _answered(options, prompt, environment if arguments is None else None)
     if arguments is None:
-        gc.freeze()  # the end of the process frees all memory at once: a last look for what nobody needs takes 0.2 s
+        gc.freeze()  # the end of the process frees all memory at once: a last collection takes 0.2 s
     return _flushed(code)
 
 
@@ -85,15 +85,15 @@ def _answered(options: argparse.Namespace, prompt: Prompt, environment: dict[str
         _close_output()  # its reader has gone; there is nobody left to tell
         return int(ExitCode.DONE)
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        warn(surroundings.shortage(error) or f"{place}{error.strerror or error}")
+        name = f"{error.filename}: " if error.filename else ""
+        warn(process_environment.shortage(error) or f"{name}{error.strerror or error}")
         return int(ExitCode.INPUT_OUTPUT)
     except Exception as error:
         return _unexpected(error, environment)
 
 
 def _unexpected(error: Exception, environment: dict[str, str] | None) -> int:
-    lacking = surroundings.shortage(error)
+    lacking = process_environment.shortage(error)
     if lacking is not None:
         warn(lacking)
         return int(ExitCode.INPUT_OUTPUT)
@@ -183,10 +183,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="cspr", description="Reach of cable-suspended parallel robots in motion.", epilog=EPILOGUE)
     parser.add_argument("--version", action="version", version=f"cspr {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-    for row in COMMANDS:
+    for command in COMMANDS:
         sub = commands.add_parser(
-            row.name, help=row.text, description=row.text, epilog="files: docs/reference.md has every key"
+            command.name, help=command.text, description=command.text, epilog="files: docs/reference.md has every key"
         )
-        row.add_arguments(sub)
-        sub.set_defaults(command=row.run)
+        command.add_arguments(sub)
+        sub.set_defaults(command=command.run)
     return parser

@@ -69,23 +69,23 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
 
 
-def _keys(options: argparse.Namespace) -> dict[str, Any]:
+def _spec(options: argparse.Namespace) -> dict[str, Any]:
     from cspr_jax.config.keys.limits import LimitTable
-    from cspr_jax.config.keys.obstacles import SurroundingsKeys
+    from cspr_jax.config.keys.obstacles import ObstacleKeys
     from cspr_jax.config.reading import checked, read_toml
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
         raise ConfigError("--smooth", f"{options.smooth}: must be a number > 0, in m")
-    keys = {name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point")}
-    keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
+    spec = {name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point")}
+    spec = {name: value for name, value in spec.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)
-        around = {name: limits.pop(name) for name in SurroundingsKeys.model_fields if name in limits}
-        checked(SurroundingsKeys, around, options.limits)
+        around = {name: limits.pop(name) for name in ObstacleKeys.model_fields if name in limits}
+        checked(ObstacleKeys, around, options.limits)
         limits = {**limits.pop("limits"), **limits} if isinstance(limits.get("limits"), dict) else limits
         checked(LimitTable, limits, options.limits)
-        keys |= {**around, "limits": limits}
-    return keys
+        spec |= {**around, "limits": limits}
+    return spec
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -97,7 +97,7 @@ def _check(options: argparse.Namespace) -> int:
     settings = retime_settings(options)
     if options.retime and options.slower:
         raise ConfigError("--retime", "must be absent with --slower")
-    keys = _keys(options)
+    spec = _spec(options)
     with waiting():
         prepare_jax(options, quick=True)
         from cspr_jax.api import checks
@@ -111,7 +111,7 @@ def _check(options: argparse.Namespace) -> int:
             "--rate": options.json and options.rate,
         }
         names = [name for name, value in outputs.items() if value]
-        check = checks.check_file(options.motion, keys, outputs=names, limits=options.limits)
+        check = checks.check_file(options.motion, spec, outputs=names, limits=options.limits)
         slower = check.slower() if options.slower and not check.feasible else None
     for line in check.plan.warnings:
         warn(line)

@@ -50,12 +50,12 @@ def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> N
 
 def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu: bool = True) -> None:
     """Set up jax by the options; from here on a line says when it compiles."""
-    from cspr_jax.runtime import surroundings, xla
+    from cspr_jax.runtime import process_environment, xla
 
-    surroundings.check_threads_of_jax()
+    process_environment.check_threads(processes=0)
     if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
         xla.prepare(options.device, warn, quick=quick, prefers_cpu=prefers_cpu)
-    surroundings.defer_fortran()
+    process_environment.defer_fortran()
     xla.check_device(options.device)
     xla.tell_compiling()
 

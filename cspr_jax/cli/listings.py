@@ -80,10 +80,10 @@ def _add_examples(parser: argparse.ArgumentParser) -> None:
 def _examples(options: argparse.Namespace) -> int:
     from cspr_jax.api.files.listings import copy_examples, list_examples
 
-    known = list_examples()
-    names = list(known) if options.all else options.name
-    shown = [str(path) for path in copy_examples(names, options.output)] if names else known
-    lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
+    examples = list_examples()
+    names = list(examples) if options.all else options.name
+    shown = [str(path) for path in copy_examples(names, options.output)] if names else examples
+    lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in examples.items()]
     if options.json:
         print_json(shown)
     else:

@@ -13,7 +13,7 @@ def _plot(options: argparse.Namespace) -> int:
     from cspr_jax.api.files.pictures import plot
     from cspr_jax.outputs.plots import selection
 
-    at = selection.places(options.at)
+    at = selection.coordinates_of(options.at)
     results = [selection.result_at(path) for path in options.result]
     if options.quantity == ACCELERATION or options.robot is not None:  # the pictures that are computed
         prepare_jax(options, quick=options.quantity != ACCELERATION)
@@ -69,7 +69,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
 def _report(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots import selection
 
-    cells = [selection.places(words.split(","), "--cell") for words in options.cell]
+    cells = [selection.coordinates_of(words.split(","), "--cell") for words in options.cell]
     source = options.result if options.result.suffix == ".toml" else selection.result_at(options.result)
     output = options.output or source.with_suffix(".html")
     with waiting():

@@ -18,9 +18,9 @@ from cspr_jax.cli.command import (
     warn,
 )
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.outputs.plots.style.options import add_look
+from cspr_jax.outputs.plots.style.options import add_style
 from cspr_jax.runtime.progress import waiting
-from cspr_jax.store.files.publishing import check_place
+from cspr_jax.store.files.publishing import check_writable
 
 ENDINGS = (".csv", ".h5", ".json")
 SAME_TICK = 1e-6  # of a step, by which the end of a motion may miss the grid of its rows
@@ -116,7 +116,7 @@ def check_files(options: argparse.Namespace) -> None:
     if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
         raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
     for path in (options.output, options.mjcf, options.animate):
-        check_place(path)
+        check_writable(path)
 
 
 def _check_step(options: argparse.Namespace) -> None:
@@ -227,7 +227,7 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
         "--anyway", action="store_true", help="play the best candidate's motion even if it is not feasible"
     )
     parser.add_argument("--step", type=float, metavar="S", help=_STEP)
-    add_look(parser)
+    add_style(parser)
     add_all_errors(parser)
     add_device(parser)
 
@@ -236,12 +236,12 @@ def _replay(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     _check_step(options)
-    check_place(options.output)
+    check_writable(options.output)
     from cspr_jax.outputs.mujoco.module import need_mujoco
     from cspr_jax.outputs.plots.style.style import style_of
 
-    look = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**look)  # before what takes long
+    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
+    style_of(**style)  # before what takes long
     need_mujoco()
     plan = _planned(options)
     if not (plan.feasible or options.anyway):
@@ -252,7 +252,7 @@ def _replay(options: argparse.Namespace) -> int:
 
         played = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
         if options.output is not None:
-            played.plot(output=options.output, **look)
+            played.plot(output=options.output, **style)
     if options.json:
         print_json(played.to_dict())
     else:

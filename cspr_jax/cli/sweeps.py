@@ -19,7 +19,7 @@ from cspr_jax.cli.command import (
     warn,
 )
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.runtime import surroundings
+from cspr_jax.runtime import process_environment
 from cspr_jax.runtime.progress import progress
 from cspr_jax.sweep.signals import stop_signals
 
@@ -72,7 +72,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
     sweep = sweeps.checked_sweep(options.sweep)
     if options.scheduler is not None:
-        surroundings.quiet_scheduler()
+        process_environment.quiet_scheduler()
     directory = options.output or sweeps.run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv), options.tiles)
     with stop_signals(warn) as stop, progress() as on_tile:
@@ -127,7 +127,7 @@ def _status(options: argparse.Namespace) -> int:
         f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}",
         f"  {state['state_text']}",
         f"  {fraction:.0f} % done: {cells}",
-        *_pace(state),
+        *_details(state),
         f"  result: {state['result'] or 'not yet'}",
         f"  last: {last.get('event', '-')} at {last.get('time', '-')}",
     ):
@@ -135,7 +135,7 @@ def _status(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
-def _pace(state: dict[str, Any]) -> list[str]:
+def _details(state: dict[str, Any]) -> list[str]:
     # Return the lines that only some runs have to say.
     lines = list[str]()
     if state["cells_per_second"] is not None and state["result"] is None:

@@ -1,13 +1,13 @@
-"""The catalogue of robots: its place and its robots; listing it needs no check of files."""
+"""The catalogue of robots: its folder and its robots; listing it needs no check of files."""
 
 import tomllib
 from pathlib import Path
 from typing import Any
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
-# Why a robot of the catalogue cannot hang still with every cable taut. `build.robots.fault_at_rest` finds it, which
+# Why a robot of the catalogue cannot hang still with every cable taut. `build.robots.error_at_rest` finds it, which
 # takes seconds; a test compares the two. Robots that are not listed here can hang still.
-FAULTS: dict[str, str] = {}
+REST_ERRORS: dict[str, str] = {}
 
 
 def catalogue_names() -> list[str]:
@@ -15,6 +15,6 @@ def catalogue_names() -> list[str]:
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
-def catalogue_keys() -> list[dict[str, Any]]:
+def catalogue_specs() -> list[dict[str, Any]]:
     """Keys of the robots that come with the package, as their files have them."""
     return [tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) for name in catalogue_names()]

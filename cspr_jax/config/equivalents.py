@@ -26,5 +26,5 @@ def no_equivalent(robot_file: RobotFile) -> str:
         if robot_file.is_platform:
             robot_file.parallel_pairs()
     except InputError as error:
-        return f"; nor do three parallel pairs of cables keep it from turning: {error.fault}"
+        return f"; nor do three parallel pairs of cables keep it from turning: {error.problem}"
     return ""

@@ -32,12 +32,12 @@ def robot_hints(robot_file: RobotFile) -> list[str]:
         )
     if robot_file.platform_points is not None and robot_file.inertia is not None:
         arms = np.asarray(robot_file.platform_points) - np.asarray(robot_file.centre_of_mass or [0.0, 0.0, 0.0])
-        reach, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(robot_file.inertia).max())
-        ratio = largest / (robot_file.mass * reach**2) if reach > 0.0 else 1.0
+        radius, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(robot_file.inertia).max())
+        ratio = largest / (robot_file.mass * radius**2) if radius > 0.0 else 1.0
         if not INERTIA_RATIOS[0] < ratio < INERTIA_RATIOS[1]:
             lines.append(
                 f"robot.inertia: {largest:g} kg m^2 for a mass of {robot_file.mass:g} kg and platform_points "
-                f"{reach:g} m from it: do the units fit? Inertia is in kg m^2, lengths are in m"
+                f"{radius:g} m from it: do the units fit? Inertia is in kg m^2, lengths are in m"
             )
     return lines + _unbalanced(robot_file)
 
@@ -78,28 +78,28 @@ def _distance_to_hull(points: np.ndarray) -> float:
     return float(np.linalg.norm(weights @ points) / weights.sum())
 
 
-def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
+def plan_hints(spec: PlanFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a plan that is not feasible."""
-    targets = {i: pose.position for i, pose in enumerate(keys.pose) if pose.position is not None and not pose.rest}
-    places = np.asarray(list(targets.values()), float).reshape(-1, 3)
-    level = in_plane(np.asarray(robot_file.base_points), places, planar=robot_file.is_planar)
+    targets = {i: pose.position for i, pose in enumerate(spec.pose) if pose.position is not None and not pose.rest}
+    positions = np.asarray(list(targets.values()), float).reshape(-1, 3)
+    level = in_plane(np.asarray(robot_file.base_points), positions, planar=robot_file.is_planar)
     lines = [
-        f"pose[{i}].position = {shown(place)}: in the plane of the spools, where no tension of the cables carries a "
+        f"pose[{i}].position = {shown(position)}: in the plane of the spools, where no tension of the cables carries a "
         "weight: must be below it"
-        for (i, place), is_level in zip(targets.items(), level, strict=True)
+        for (i, position), is_level in zip(targets.items(), level, strict=True)
         if is_level
     ]
-    text = forgotten_axis(robot_file, places[~level].tolist())
+    text = forgotten_axis(robot_file, positions[~level].tolist())
     return [*lines, f"pose: {text}"] if text else lines
 
 
-def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
+def sweep_hints(spec: SweepFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a sweep."""
-    lines, start, workspace = list[str](), keys.trajectory.start, keys.workspace
-    if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
+    lines, start, workspace = list[str](), spec.trajectory.start, spec.workspace
+    if start is not None and start.position is not None and not start.rest and spec.axes.z0 is not None:
         depth_hints = (
             almost_at_rest("trajectory.from.position", start.position, z0, robot_file)
-            for z0 in axis_points(keys.axes.z0)
+            for z0 in axis_points(spec.axes.z0)
         )
         lines += [line for line in depth_hints if line][:1]
     if workspace is not None and "interference-free" in workspace.conditions and not robot_file.cable_diameter:

@@ -6,17 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
-from cspr_jax.config.keys.ellipse import WHOLE, EllipseTable
+from cspr_jax.config.keys.ellipse import ELLIPSE_KEYS, EllipseTable
 from cspr_jax.config.keys.free_motions import FreeMotionKeys
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.config.keys.limits import LimitTable, Point, Positive
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.path import PathTable
 from cspr_jax.config.keys.pose import Pose, Turns
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
-from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
-from cspr_jax.config.wording import fault, name_of
+from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml, refuse_other_kinds
+from cspr_jax.config.wording import name_of, table_error
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
 
@@ -35,7 +34,7 @@ Depth = Annotated[
 ]
 
 
-class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
+class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
     """A plan."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
@@ -185,9 +184,11 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
             return data
         source = {key: data[key] for key in ("motion", "trajectory") if data.get(key) is not None}
         if "trajectory" in source and "motion" not in source:
-            raise fault("trajectory", shown(source["trajectory"]), "beside motion, the file that holds it")
+            raise table_error("trajectory", shown(source["trajectory"]), "beside motion, the file that holds it")
         if source and "pose" in data:
-            raise fault("motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion")
+            raise table_error(
+                "motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion"
+            )
         return data | {"pose": [{}, source]} if source else data
 
     @model_validator(mode="before")
@@ -196,7 +197,7 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         # A plan of one ellipse is a plan of two poses, which turns on it.
         if not isinstance(data, dict) or data.get("family") != "ellipse":
             return data
-        flat = {name: data[name] for name in WHOLE if name in data}
+        flat = {name: data[name] for name in ELLIPSE_KEYS if name in data}
         if "pose" in data or not (flat or "ellipse" in data):
             return data
         if "ellipse" in data:  # keys beside the table are unknown ones
@@ -207,10 +208,10 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     def _on_one_ellipse(self) -> "PlanFile":
         if self.ellipse is None:
             if self.turns is not None:
-                raise fault("turns", self.turns, "absent beside [[pose]] tables, which have turns of their own")
+                raise table_error("turns", self.turns, "absent beside [[pose]] tables, which have turns of their own")
             return self
         if len(self.pose) != 2 or any(pose.model_fields_set for pose in self.pose):
-            raise fault("ellipse", "{...}", "absent beside [[pose]] tables, which have ellipses of their own")
+            raise table_error("ellipse", "{...}", "absent beside [[pose]] tables, which have ellipses of their own")
         pose = [Pose(ellipse=self.ellipse), Pose(turns=1.0 if self.turns is None else self.turns)]
         return self.model_copy(update={"pose": pose})
 
@@ -229,22 +230,22 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         if path is None or (has_poses and not path.is_whole):
             return self
         if not path.is_whole:
-            raise fault("path.points", None, "the points of the path, or [[pose]] tables")
+            raise table_error("path.points", None, "the points of the path, or [[pose]] tables")
         if has_poses:
             key = next(key for key in ("points", "file", "centre") if getattr(path, key) is not None)
-            raise fault(
+            raise table_error(
                 f"path.{key}", shown(getattr(path, key)), "absent beside [[pose]] tables, which have the places"
             )
         if path.points is not None and len(path.points) < 2:
-            raise fault("path.points", shown(path.points), "two points or more")
+            raise table_error("path.points", shown(path.points), "two points or more")
         if path.centre is not None and path.start is None:
-            raise fault("path.start", None, "where the path begins, [x, y, z], m")
+            raise table_error("path.start", None, "where the path begins, [x, y, z], m")
         return self.model_copy(update={"pose": [Pose(), Pose(path=path)]})
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":
         if self.pose[0].family is not None:
-            raise fault("pose[0].family", self.pose[0].family, "absent: no segment ends at the first pose")
+            raise table_error("pose[0].family", self.pose[0].family, "absent: no segment ends at the first pose")
         return self
 
     @model_validator(mode="after")
@@ -255,20 +256,22 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         family = None if self.launch.segment > last else self.family_of(self.launch.segment)
         if family not in ("bezier", "ellipse"):
             allowed = f'from 0 to {last}, a pose from which family = "bezier" or "ellipse" leads on'
-            raise fault("launch.segment", self.launch.segment, allowed)
+            raise table_error("launch.segment", self.launch.segment, allowed)
         end, after = self.pose[self.launch.segment + 1], self.launch.segment + 1
         for key, value in (("position", end.position), ("rest", end.rest or None)):
             if value is not None:
                 name = f"pose[{self.launch.segment + 1}].{key}"
-                raise fault(name, value, "absent: the segment of the launch ends where it follows from the launch")
+                raise table_error(
+                    name, value, "absent: the segment of the launch ends where it follows from the launch"
+                )
         if family == "ellipse":
             return self
         if after <= last and self.family_of(after) != "bezier":
             allowed = '"bezier": behind the segment of the launch the acceleration goes on'
-            raise fault(f"pose[{after + 1}].family", shown(self.family_of(after)), allowed)
+            raise table_error(f"pose[{after + 1}].family", shown(self.family_of(after)), allowed)
         if self.first_control_point is not None or self.least == "each":
             key = "least" if self.first_control_point is None else "first_control_point"
-            raise fault(
+            raise table_error(
                 key,
                 shown(getattr(self, key)),
                 "cannot be combined with [launch], from which accelerations and durations follow",
@@ -286,20 +289,20 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         tables = {f"pose[{i}].ellipse": pose.ellipse for i, pose in enumerate(self.pose) if i != of_launch}
         for name, table in ({"ellipse": self.ellipse} | tables).items():
             if table is not None and table.half_axes is None and table.radius is None:
-                raise fault(f"{name}.radius", None, "half_axes, or the radius of a circle: one of them")
+                raise table_error(f"{name}.radius", None, "half_axes, or the radius of a circle: one of them")
         return self
 
     def _check_launch_ellipse(self, i: int) -> None:
         table = self.pose[i].ellipse
         if table is None:
-            raise fault(f"pose[{i}].ellipse", None, "{ centre = [x, y, z] }, whose axes the launch determines")
+            raise table_error(f"pose[{i}].ellipse", None, "{ centre = [x, y, z] }, whose axes the launch determines")
         for key in ("half_axes", "radius", "normal", "phase"):
             if key in table.model_fields_set:
                 value = getattr(table, key)
-                raise fault(f"pose[{i}].ellipse.{key}", value, "absent: the launch determines the ellipse")
+                raise table_error(f"pose[{i}].ellipse.{key}", value, "absent: the launch determines the ellipse")
         if self.launch is not None and self.launch.release is not None:
             allowed = "absent: the object leaves an ellipse at the end of the segment"
-            raise fault("launch.release", self.launch.release, allowed)
+            raise table_error("launch.release", self.launch.release, allowed)
 
     @model_validator(mode="after")
     def _one_place(self) -> "PlanFile":
@@ -308,17 +311,19 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         limits = {name: getattr(self.limits, name) for name in sorted(self.limits.model_fields_set)}
         for name, value in limits.items():
             if getattr(self, name) is not None:
-                raise fault(f"limits.{name}", value, f"cannot be combined with {name} = {shown(getattr(self, name))}")
+                raise table_error(
+                    f"limits.{name}", value, f"cannot be combined with {name} = {shown(getattr(self, name))}"
+                )
         # The rest of the program finds limits in one place.
         return self.model_copy(update={"limits": None, **limits})
 
 
 def read_plan(text: str, path: Path) -> PlanFile:
     """A plan file."""
-    return plan_keys(parse_toml(text, path), path)
+    return checked_plan(parse_toml(text, path), path)
 
 
-def kept_plan(text: str, path: Path) -> PlanFile:
+def plan_of_text(text: str, path: Path) -> PlanFile:
     """Plan that a motion file holds: the text of the plan file, or JSON where there was none."""
     if len(text) > LARGEST_FILE:
         raise ConfigError(path, f"plan of {len(text)} letters: must be at most {LARGEST_FILE}")
@@ -328,10 +333,10 @@ def kept_plan(text: str, path: Path) -> PlanFile:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ConfigError(path, f"its plan cannot be read: {error}") from error
-    return plan_keys(data, path)
+    return checked_plan(data, path)
 
 
-def plan_keys(data: dict[str, Any], file: object) -> PlanFile:
+def checked_plan(data: dict[str, Any], file: object) -> PlanFile:
     """Parsed content of a plan file."""
     refuse_other_kinds(data, "plan", file)
     return checked(PlanFile, data, file)

@@ -2,34 +2,36 @@
 
 import codecs
 import contextlib
+import json
 import os
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cspr_jax.config import wording
-from cspr_jax.errors import ConfigError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import look_alike
 
 LARGEST_FILE = 1 << 20
 # The time that tomllib takes grows with the square of a key's parts.
 LONGEST_KEY = 64
-MOST_LINES = 1000  # faults of one file
+LARGEST_LINES = 1000  # errors of one file
 _PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""
-_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)$")
+_LOCATION = re.compile(r"\(at line (\d+), column (\d+)\)$")
 _STRING = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins like the mark of UTF-16
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins like that of UTF-16
     (codecs.BOM_UTF32_BE, "UTF-32"),
     (codecs.BOM_UTF16_LE, "UTF-16"),
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
-# Which of the first four bytes are zero, where no mark says it.
+# Which of the first four bytes are zero, where no byte order mark says it.
 _ZEROS: dict[tuple[bool, ...], str] = {
     (False, True, False, True): "UTF-16",
     (True, False, True, False): "UTF-16",
@@ -37,6 +39,25 @@ _ZEROS: dict[tuple[bool, ...], str] = {
     (True, True, True, False): "UTF-32",
 }
 _LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
+
+# Keys that only one kind has, and where it belongs.
+_DISTINCTIVE_KEYS = {
+    "sweep": ("map", "axes", "trajectory", "run", "orientations"),
+    "plan": ("pose",),
+    "robot": ("base_points", "platform_points", "mass", "inertia"),
+}
+_EXPECTED = {
+    "sweep": "a sweep file, with map, [axes] and [trajectory]",
+    "plan": "a plan file, with [[pose]] tables",
+    "robot": "a robot file, with base_points and mass",
+}
+_USES = {
+    "sweep": "a sweep is computed by `cspr run`",
+    "plan": "a plan is computed by `cspr plan`",
+    "robot": 'a robot file is named in a plan or sweep, robot = "FILE.toml"',
+}
+# Deeper than any of our files is nested; a value that holds itself is deeper still.
+DEEPEST = 32
 
 Model = TypeVar("Model", bound="Table")
 
@@ -63,9 +84,9 @@ def other_case(path: Path) -> str:
 def read_bytes(path: Path) -> bytes:
     """Content of a file."""
     with opened(path) as file:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise ConfigError(path, f"file of {size} bytes: must be at most {LARGEST_FILE}")
+        length = path.stat().st_size
+        if length > LARGEST_FILE:
+            raise ConfigError(path, f"file of {length} bytes: must be at most {LARGEST_FILE}")
         return file.read()
 
 
@@ -92,7 +113,7 @@ def read_text(path: Path) -> str:
 
 def decoded(data: bytes, path: Path, *, line: int = 1) -> str:
     """Text of the content of a file."""
-    marked = (name for mark, name in _MARKS if data.startswith(mark))
+    marked = (name for start, name in _BYTE_ORDER_MARKS if data.startswith(start))
     encoding = next(marked, _ZEROS.get(tuple(byte == 0 for byte in data[:4])))
     if encoding is not None:
         raise ConfigError(path, f"is {encoding} text: save it as UTF-8")
@@ -135,11 +156,11 @@ def refuse_long_numbers(text: str, path: Path) -> None:
 
 def _stop(text: str, message: str) -> int:
     # Index at which tomllib stopped; it counts lines and columns from 1.
-    place = _PLACE.search(message)
-    if place is None:
+    location = _LOCATION.search(message)
+    if location is None:
         return len(text.rstrip())
-    lines = text.split("\n")[: int(place[1]) - 1]
-    return sum(len(line) + 1 for line in lines) + int(place[2]) - 1
+    lines = text.split("\n")[: int(location[1]) - 1]
+    return sum(len(line) + 1 for line in lines) + int(location[2]) - 1
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -155,5 +176,39 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
         raise ConfigError(file, "is nested too deeply") from error
     except ValidationError as error:
         mistakes = sorted(error.errors(include_url=False), key=wording.rank)
-        lines = [wording.line(model, one, at) for one in mistakes[:MOST_LINES]]
+        lines = [wording.line(model, one, at) for one in mistakes[:LARGEST_LINES]]
         raise ConfigError(file, lines[0], others=lines[1:], count=len(mistakes) - 1) from error
+
+
+def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> None:
+    """Refuse a file of another kind, robot, plan or sweep, rather than every key of it."""
+    if any(key in data for key in _DISTINCTIVE_KEYS[expected]):
+        return
+    for kind, distinctive in _DISTINCTIVE_KEYS.items():
+        # The trajectory of a plan is a name, that of a sweep a table.
+        theirs = [
+            key for key in distinctive if key in data and not (key == "trajectory" and isinstance(data[key], str))
+        ]
+        if theirs:
+            names = ", ".join(theirs)
+            raise ConfigError(file, f"is a {kind} file (it has {names}): must be {_EXPECTED[expected]}; {_USES[kind]}")
+
+
+def plain_values(value: Any, depth: int = DEEPEST) -> Any:
+    """A value as parsed TOML has it, of a dictionary that may hold NumPy's numbers and arrays too."""
+    if not depth:
+        raise InputError(
+            "given", None, f"must be nested at most {DEEPEST} deep", problem="nested too deep, or in itself"
+        )
+    if isinstance(value, Mapping):
+        return {str(key): plain_values(inner, depth - 1) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain_values(inner, depth - 1) for inner in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
+def json_text(data: dict[str, Any]) -> str:
+    """JSON that is kept in place of a file's text."""
+    return json.dumps(data, default=str)

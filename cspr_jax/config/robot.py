@@ -13,22 +13,23 @@ from cspr_jax.config.keys.limits import (
     LARGEST_LENGTH,
     MOST_CABLES,
     LimitKeys,
+    MatrixRow,
     NotNegativePerCable,
     PerCableDirection,
     Point,
     Positive,
-    Row,
 )
-from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import checked, other_case, read_toml
-from cspr_jax.config.wording import fault
+from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
+from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 
-LEAST = "least numbers of cables are " + ", ".join(f"{row.dof} ({row.description})" for row in PATTERNS.values())
+SMALLEST_COUNTS = "least numbers of cables are " + ", ".join(
+    f"{row.dof} ({row.description})" for row in PATTERNS.values()
+)
 BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
 POINTS = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if not row.is_body)
 # Two spools count as level if their heights differ by less than this part of their distance; as in
@@ -47,7 +48,7 @@ class RobotFile(LimitKeys):
     platform_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] | None = Field(
         None, description="platform: points where the cables are attached, one per cable, platform axes, m"
     )
-    inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
+    inertia: Annotated[list[MatrixRow], Field(min_length=3, max_length=3)] | None = Field(
         None,
         description="platform: inertia tensor about the mass centre, platform axes, kg m^2, components up to 1e18",
     )
@@ -123,33 +124,33 @@ class RobotFile(LimitKeys):
         """Kind of robot, for people."""
         if self._platform is not None:
             return "a platform that only translates"
-        known = {"2T": "a planar robot", "3R3T": "a platform"}
-        return known.get(self.own_pattern, PATTERNS[self.own_pattern].description)
+        names = {"2T": "a planar robot", "3R3T": "a platform"}
+        return names.get(self.own_pattern, PATTERNS[self.own_pattern].description)
 
     @model_validator(mode="after")
     def _kind(self) -> "RobotFile":
         if (self.platform_points is None) != (self.inertia is None):
             missing, other = ("inertia", "platform_points") if self.inertia is None else ("platform_points", "inertia")
-            raise fault(missing, None, f"a rigid platform has it beside {other}, a point mass has neither")
+            raise table_error(missing, None, f"a rigid platform has it beside {other}, a point mass has neither")
         if self.centre_of_mass is not None and not self.is_platform:
-            raise fault("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
+            raise table_error("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
         pattern, count = self.own_pattern, len(self.base_points)
         row = PATTERNS[pattern]
         if row.is_body != self.is_platform:
-            raise fault(
+            raise table_error(
                 "pattern", shown(pattern), f"{BODIES if self.is_platform else POINTS}, or absent: as the other keys say"
             )
         if self.planar and not row.is_planar:
             if self.is_platform:
                 allowed = "false, or absent, for a rigid platform (platform_points, inertia)"
-                raise fault("planar", True, f'{allowed}; a planar one has pattern = "1R2T"')
-            raise fault("pattern", shown(pattern), '"2T", or absent: as the other keys say')
+                raise table_error("planar", True, f'{allowed}; a planar one has pattern = "1R2T"')
+            raise table_error("pattern", shown(pattern), '"2T", or absent: as the other keys say')
         if count < row.dof:
-            allowed = f"at least {row.dof} ({row.description}), as the other keys say; {LEAST}"
-            raise fault("base_points", f"{count} points", allowed)
+            allowed = f"at least {row.dof} ({row.description}), as the other keys say; {SMALLEST_COUNTS}"
+            raise table_error("base_points", f"{count} points", allowed)
         if self.platform_points is not None and len(self.platform_points) != count:
             allowed = f"{count}, as many as base_points"
-            raise fault("platform_points", f"{len(self.platform_points)} points", allowed)
+            raise table_error("platform_points", f"{len(self.platform_points)} points", allowed)
         if pattern == "2T" and count == row.dof:
             _check_level(self.base_points)
         return self
@@ -160,17 +161,17 @@ class RobotFile(LimitKeys):
             try:
                 self.parallel_pairs()
             except InputError as error:
-                raise fault("translation_only", True, f"absent: {error.fault}") from error
+                raise table_error("translation_only", True, f"absent: {error.problem}") from error
         return self
 
     def parallel_pairs(self) -> ParallelPairs:
         """Pairs of a platform's cables, `robots.model.parallel_pairs`."""
         if self.platform_points is None:
-            raise InputError("platform_points", None, "given", fault="it has no platform_points")
+            raise InputError("platform_points", None, "given", problem="it has no platform_points")
         if self.own_pattern != "3R3T":
-            raise InputError("pattern", None, "3R3T", fault=f"it is {self.kind}")
+            raise InputError("pattern", None, "3R3T", problem=f"it is {self.kind}")
         if self.pulley_radius is not None:
-            raise InputError("pulley_radius", None, "absent", fault="its cables leave from pulleys")
+            raise InputError("pulley_radius", None, "absent", problem="its cables leave from pulleys")
         points = np.asarray(self.platform_points) - np.asarray(self.centre_of_mass or [0.0, 0.0, 0.0])
         return parallel_pairs(self.base_points, points)
 
@@ -203,24 +204,24 @@ class RobotFile(LimitKeys):
         for row in LIMITS:
             value, count = getattr(self, row.name, None), len(self.base_points)
             if isinstance(value, list) and len(value) != count:
-                raise fault(row.name, value, f"{row.allowed}, or {count}: one a cable")
+                raise table_error(row.name, value, f"{row.allowed}, or {count}: one a cable")
         radii, axes = self.pulley_radius, self.pulley_axes
         if isinstance(radii, list) and len(radii) != count:
-            raise fault("pulley_radius", radii, f"a number >= 0, or {count}: one a cable")
+            raise table_error("pulley_radius", radii, f"a number >= 0, or {count}: one a cable")
         if axes is not None and radii is None:
-            raise fault("pulley_axes", axes, "absent without pulley_radius")
+            raise table_error("pulley_axes", axes, "absent without pulley_radius")
         if axes is not None and isinstance(axes[0], list) and len(axes) != count:
-            raise fault("pulley_axes", f"{len(axes)} vectors", f"one vector, or {count}: one a cable")
+            raise table_error("pulley_axes", f"{len(axes)} vectors", f"one vector, or {count}: one a cable")
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:
-        """Place of a key of the robot, for errors."""
+        """File and dotted name of a key of the robot, for errors."""
         return (file, f"robot.{key}") if self._file is None else (self._file, key)
 
     def typed(self, error: InputError) -> str:
         """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes."""
         value = getattr(self, error.key, None)
-        if error.fault or value is None:
+        if error.problem or value is None:
             return f"robot.{error}"
         return f"robot.{error.key} = {shown(value)}: {demand(error.allowed)}"
 
@@ -229,7 +230,7 @@ def _check_level(points: list[Point]) -> None:
     (x1, _, z1), (x2, _, z2) = points
     if abs(z2 - z1) > LEVEL * abs(x2 - x1):
         heights = f"spools at heights z = {z1:g} and {z2:g}"
-        raise fault("base_points", heights, "level in a planar robot: give both spools the same z")
+        raise table_error("base_points", heights, "level in a planar robot: give both spools the same z")
 
 
 def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
@@ -268,7 +269,7 @@ def _missing(reference: str, file: object, path: Path) -> ConfigError:
 def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:
     """A robot file of another program, `config.formats`."""
     imported = read(path, cable_set)
-    robot_file = checked(RobotFile, imported.keys, path)
+    robot_file = checked(RobotFile, imported.spec, path)
     robot_file._file, robot_file._notes = path, imported.warnings
     return robot_file, imported
 

@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from cspr_jax.config.keys.ellipse import SweepEllipse
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import Coordinate, LimitTable, Point
-from cspr_jax.config.keys.obstacles import Obstacles, SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
 from cspr_jax.config.keys.path import TargetPath
 from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
@@ -232,7 +232,7 @@ class _SweepKeys(Table):
     run: RunTable = Field(default_factory=RunTable, description="[run] dtype, tile, store")
 
 
-class SweepFile(SurroundingsKeys, _SweepKeys):
+class SweepFile(ObstacleKeys, _SweepKeys):
     """A sweep."""
 
     obstacle: Obstacles | None = Field(

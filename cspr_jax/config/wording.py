@@ -1,4 +1,4 @@
-"""Faults of a file, one line each in the words of TOML: no word of the library that checks it."""
+"""Errors of a file, one line each in the words of TOML: no word of the library that checks it."""
 
 import datetime
 import math
@@ -13,7 +13,7 @@ from cspr_jax.errors.suggestions import look_alike, nearest
 
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"
-FAULT = "fault"
+TABLE_ERROR = "table_error"
 LONGEST_NAME = 200
 _KINDS = {
     "model_type": "a table",
@@ -36,10 +36,10 @@ _BOUNDS = {
 }
 
 
-def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
+def table_error(key: str, value: object, allowed: str) -> PydanticCustomError:
     """Error that a validator of a table raises about one of its keys, or about several together."""
     text = value if isinstance(value, str) else shown(value)
-    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": text, "allowed": allowed})
+    return PydanticCustomError(TABLE_ERROR, "{allowed}", {"key": key, "given": text, "allowed": allowed})
 
 
 def either(names: Iterable[str]) -> str:
@@ -48,11 +48,11 @@ def either(names: Iterable[str]) -> str:
     return f"{', '.join(others)} or {last}" if others else last
 
 
-def name_of(rows: Callable[[], Collection[str]]) -> PlainValidator:
-    """Validator of a key whose values are names of rows of a table, which may grow."""
+def name_of(get_names: Callable[[], Collection[str]]) -> PlainValidator:
+    """Validator of a key whose values are names in a table, which may grow."""
 
     def check(value: Any) -> str:
-        table = rows()
+        table = get_names()
         if not (isinstance(value, str) and value in table):
             names = list(table)
             raise PydanticCustomError("literal_error", "{expected}", {"expected": either(names).replace('"', "'")})
@@ -62,7 +62,7 @@ def name_of(rows: Callable[[], Collection[str]]) -> PlainValidator:
 
 
 def rank(error: ErrorDetails) -> int:
-    """Place of an error among those of a file: an error that explains others goes first."""
+    """Order of an error among those of a file: an error that explains others goes first."""
     if error["loc"] == ("schema",) and error["type"] != "missing":
         return 0
     return 1 if error["type"] == "extra_forbidden" else 2
@@ -74,7 +74,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
     last_part = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
     parts = [part for part in error["loc"][: len(error["loc"]) - len(last_part)] if not str(part).startswith(VARIANT)]
     parts += last_part
-    if error["type"] == FAULT:
+    if error["type"] == TABLE_ERROR:
         context = error.get("ctx", {})
         parts += [context["key"]] if context["key"] else []
         if context["given"] == shown(None):

@@ -45,7 +45,7 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
     for name, values in ({"positions": positions} | arrays).items():
         if len(values) != len(times):
             raise InputError(
-                name, None, f"must have {len(times)} rows, one for each time", fault=f"shape {values.shape}"
+                name, None, f"must have {len(times)} rows, one for each time", problem=f"shape {values.shape}"
             )
     if "quaternions" in arrays:
         with np.errstate(over="ignore"):
@@ -70,7 +70,7 @@ def source_spline(
         turning = np.zeros((len(spline.knots) - 1, 1, 4)) + np.eye(4)[0]
         return dataclasses.replace(spline, quaternion=as_float64(turning))
     if not is_platform and spline.quaternion is not None:
-        raise InputError("quaternions", None, "must be absent for a point mass", fault="orientations")
+        raise InputError("quaternions", None, "must be absent for a point mass", problem="orientations")
     return spline
 
 
@@ -79,24 +79,24 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
     row, position = PATTERNS[pattern], np.array(spline.position)
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
     if is_planar and not row.is_planar:
-        raise InputError("positions", None, "must have y too, but for planar robots", fault="x and z alone")
+        raise InputError("positions", None, "must have y too, but for planar robots", problem="x and z alone")
     tolerance = BESIDE * np.abs(position).max()
     if row.is_planar:
         beside = float(np.abs(position[:, :, 1]).max())
         if beside > tolerance:
-            raise InputError("positions", None, "must be 0 on a planar robot", fault=f"y reaches {beside:.3g} m")
+            raise InputError("positions", None, "must be 0 on a planar robot", problem=f"y reaches {beside:.3g} m")
         position[:, :, 1] = 0.0
         if turning is not None:
             if np.abs(turning[:, :, [1, 3]]).max() > BESIDE * np.abs(turning).max():
-                raise InputError("orientations", None, "must turn about y alone", fault="those of a planar robot")
+                raise InputError("orientations", None, "must turn about y alone", problem="those of a planar robot")
             turning[:, :, [1, 3]] = 0.0
     if row.name == "1T" and np.ptp(position[:, :, :2], axis=(0, 1)).max() > tolerance:
-        raise InputError("positions", None, "must be the same everywhere on a vertical guide", fault="x and y")
+        raise InputError("positions", None, "must be the same everywhere on a vertical guide", problem="x and y")
     if row.is_jointed:
         moved = float(np.ptp(position, axis=(0, 1)).max())
         if not moved <= JOINT_STAYS:
             allowed = "must be those of the joint about which the robot turns, the same everywhere"
-            raise InputError("positions", None, allowed, fault=f"they differ by {moved:.3g} m")
+            raise InputError("positions", None, allowed, problem=f"they differ by {moved:.3g} m")
         position[:] = position[0, 0]
     return dataclasses.replace(
         spline, position=as_float64(position), quaternion=None if turning is None else as_float64(turning)

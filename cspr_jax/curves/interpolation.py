@@ -105,7 +105,7 @@ def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: 
         if value not in allowed:
             raise InputError(name, value, " or ".join(f'"{each}"' for each in allowed))
     if times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
-        raise InputError("times", None, "must be two or more finite numbers, in s", fault=f"shape {times.shape}")
+        raise InputError("times", None, "must be two or more finite numbers, in s", problem=f"shape {times.shape}")
     check_order(times, repeated=False)
     check_steps(times)
     for name, values, width in (("positions", positions, 3), ("quaternions", quaternions, 4)):
@@ -114,7 +114,7 @@ def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: 
         array = np.asarray(values, float)
         if array.shape != (len(times), width):
             raise InputError(
-                name, None, f"must be ({len(times)}, {width}), a row for each time", fault=f"{array.shape}"
+                name, None, f"must be ({len(times)}, {width}), a row for each time", problem=f"{array.shape}"
             )
         bad = np.flatnonzero(~np.isfinite(array).all(1))
         if len(bad):

@@ -68,12 +68,12 @@ def pieces_of(curve: Any) -> MotionPieces:
     elif isinstance(curve, BPoly):
         knots, powers = curve.x, np.moveaxis(curve.c, 0, 1)
     else:
-        raise InputError("motion", None, "must be a BSpline, PPoly, BPoly or CubicSpline", fault=type(curve).__name__)
+        raise InputError("motion", None, "must be a BSpline, PPoly, BPoly or CubicSpline", problem=type(curve).__name__)
     if powers.ndim != 3 or powers.shape[2] not in _WIDTHS or np.iscomplexobj(powers):
         allowed = "must be (n, 3) positions, (n, 2) x and z, or (n, 7) positions and quaternions, over the first axis"
-        raise InputError("motion", None, allowed, fault=f"values of shape {powers.shape[2:]}")
+        raise InputError("motion", None, allowed, problem=f"values of shape {powers.shape[2:]}")
     if not np.isfinite(powers).all() or not (np.diff(knots) > 0.0).all():
-        raise InputError("motion", None, "must have finite coefficients and increasing knots", fault="a curve")
+        raise InputError("motion", None, "must have finite coefficients and increasing knots", problem="a curve")
     table = powers
     if not isinstance(curve, BPoly):
         table = bernstein_of_powers(powers * np.diff(knots)[:, None, None] ** np.arange(powers.shape[1])[:, None])
@@ -141,7 +141,7 @@ def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndar
         if len(far):
             error = f"its {words} jumps by {jumps[far[0]]:.3g} at t = {knots[far[0] + 1]:.6g} s"
             raise InputError(
-                name, None, "must be continuous with its first derivative: no force makes a mass jump", fault=error
+                name, None, "must be continuous with its first derivative: no force makes a mass jump", problem=error
             )
 
 
@@ -198,5 +198,5 @@ def _check_window(before: Spline, after: Spline) -> None:
                     "interpolation",
                     None,
                     'must be "cubic" or "hermite" in so long a table',
-                    fault="the spline through its uneven times is felt from window to window",
+                    problem="the spline through its uneven times is felt from window to window",
                 )

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.sparse import block_diag, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
-from cspr_jax.config.motions.hints import CLOSER
+from cspr_jax.config.motions.stamps import CLOSER
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.curves.interpolation import continuous
 from cspr_jax.curves.noise import deviation_of

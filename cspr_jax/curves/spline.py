@@ -228,7 +228,7 @@ def spline_bounds(
     return StateBounds(*translation, *in_batches(_rotations, turning, batch_size=BATCH))
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _rotations(quaternions):
     return jax.vmap(rotation_bounds)(*quaternions)
 

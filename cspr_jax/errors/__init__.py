@@ -44,16 +44,16 @@ class InputError(CsprError, ValueError):
 
     Args:
         key: the key or argument, dotted.
-        fault: what is wrong, in words, where the value does not show it.
+        problem: what is wrong, in words, where the value does not show it.
     """
 
     exit_code = ExitCode.BAD_INPUT
 
-    def __init__(self, key: str, value: object, allowed: str, *, fault: str = "") -> None:
+    def __init__(self, key: str, value: object, allowed: str, *, problem: str = "") -> None:
         """Keep the parts, so that a reader of files can add its name."""
-        line = f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: {demand(allowed)}"
+        line = f"{key}: {problem}: {allowed}" if problem else f"{key} = {shown(value)}: {demand(allowed)}"
         super().__init__(printable(line))
-        self.key, self.value, self.allowed, self.fault = key, value, allowed, fault
+        self.key, self.value, self.allowed, self.problem = key, value, allowed, problem
 
 
 class ConfigError(CsprError):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cspr_jax.errors import InputError
-from cspr_jax.errors.given_numbers import ANY, Numbers, whole
+from cspr_jax.errors.given_numbers import ANY, Numbers, checked_integer
 from cspr_jax.errors.suggestions import one_of
 
 Rule = Callable[[str, Any], None]
@@ -34,7 +34,7 @@ class Integer:
 
     def __call__(self, key: str, value: Any) -> None:
         """Refuse other values."""
-        whole(key, value, self.minimum, self.maximum)
+        checked_integer(key, value, self.minimum, self.maximum)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Choice:
         try:
             self.rule(key, value)
         except InputError as error:
-            if not isinstance(value, str) or error.fault:
+            if not isinstance(value, str) or error.problem:
                 raise
             raise InputError(key, value, one_of(value, filter(None, self.others), error.allowed)) from None
 

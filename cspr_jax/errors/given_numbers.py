@@ -39,7 +39,7 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
     raise InputError(key, value, allowed)
 
 
-def whole(key: str, value: Any, minimum: int, maximum: int) -> int:
+def checked_integer(key: str, value: Any, minimum: int, maximum: int) -> int:
     """Integer that a caller gave."""
     allowed = f"an integer from {minimum} to {maximum}"
     try:
@@ -86,7 +86,7 @@ class Numbers:
         if self.shapes is not None and not any(_fits(values.shape, shape) for shape in self.shapes):
             if not values.ndim:
                 raise InputError(key, value, self.allowed)
-            raise InputError(key, None, f"must be {self.allowed}", fault=f"an array of shape {values.shape}")
+            raise InputError(key, None, f"must be {self.allowed}", problem=f"an array of shape {values.shape}")
         inside = (values > 0.0 if self.positive else values >= self.minimum) & (values <= self.maximum)
         inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)
         inside |= np.isnan(values) & self.nan
@@ -132,4 +132,4 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
     part = traced_part(value)
     if part is not None:
         error = "a tracer of jax, as grad, jit and vmap pass"
-        raise InputError(key + part, None, f"must be numbers: {instead}", fault=error)
+        raise InputError(key + part, None, f"must be numbers: {instead}", problem=error)

@@ -65,7 +65,7 @@ def nearest(text: str, allowed: Iterable[str]) -> str | None:
         words = [word.replace("height", "floor") for word in words]
     if words:
         # Among equals, prefer the name with the most similar letters.
-        ranked = [(_problem(words, _words(name)), _letters(text, name), name) for name in names]
+        ranked = [(_common_fraction(words, _words(name)), _letters(text, name), name) for name in names]
         best = max(ranked, default=(0.0, 0.0, ""))
         if best[0] > ENOUGH:
             return best[2]
@@ -96,10 +96,10 @@ def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
     return f"{question}{demand(allowed)}" if question else allowed
 
 
-def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection[str]) -> None:
+def ask_about_keywords(function: str, keywords: Iterable[str], accepted: Collection[str]) -> None:
     """Raise a `TypeError` where a keyword that a function does not take is nearly one that it takes."""
-    for key in (key for key in keywords if key not in known):
-        question = did_you_mean(key, known)
+    for key in (key for key in keywords if key not in accepted):
+        question = did_you_mean(key, accepted)
         if question:
             raise TypeError(f"{function}() takes no {key}: {question.strip()}") from None
 
@@ -107,11 +107,11 @@ def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection
 def with_suggestions(kind: Kind) -> Kind:
     """Make a class ask about keywords that are nearly those of its constructor."""
     plain = kind.__init__  # type: ignore[misc]
-    known = tuple(inspect.signature(kind).parameters)
+    accepted = tuple(inspect.signature(kind).parameters)
 
     @functools.wraps(plain)
     def with_question(self: Any, *arguments: Any, **keywords: Any) -> None:
-        ask_about_keywords(kind.__name__, keywords, known)
+        ask_about_keywords(kind.__name__, keywords, accepted)
         plain(self, *arguments, **keywords)
 
     kind.__init__ = with_question  # type: ignore[misc]
@@ -128,7 +128,7 @@ def _letters(first: str, second: str) -> float:
     return difflib.SequenceMatcher(None, first, second).ratio()
 
 
-def _problem(first: list[str], second: list[str]) -> float:
+def _common_fraction(first: list[str], second: list[str]) -> float:
     # Return the share of words that both have, in all words of both.
     left, count = list(second), 0
     for word in first:

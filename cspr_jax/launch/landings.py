@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.errors.given_numbers import Numbers, whole
+from cspr_jax.errors.given_numbers import Numbers, checked_integer
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.launch.flight import flown
 from cspr_jax.motion.motion import Motion
@@ -77,8 +77,8 @@ class LaunchErrors:
         """Refuse numbers out of their ranges."""
         for name in ("release", "cable_length", "cable_speed", "encoder"):
             Numbers("a number from 0 to 1000", minimum=0.0, maximum=LARGEST_ERROR).array(name, getattr(self, name))
-        whole("throws", self.throws, 2, MAX_THROWS)
-        whole("seed", self.seed, 0, LARGEST_SEED)
+        checked_integer("throws", self.throws, 2, MAX_THROWS)
+        checked_integer("seed", self.seed, 0, LARGEST_SEED)
 
 
 @dataclasses.dataclass(frozen=True)

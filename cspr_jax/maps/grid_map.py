@@ -63,7 +63,7 @@ class GridMap(abc.ABC):
 
     def _surroundings(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None: it has neither obstacles nor a shape of the platform.
-        if not self._keys.surroundings:
+        if not self._keys.obstacle_keys:
             return None
         from cspr_jax.build.scenes import scene_of  # with the geometry of bodies, which other sweeps need not
 

@@ -56,7 +56,7 @@ def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
     for row in UNCERTAINTIES:
         value = getattr(uncertainty, row.name, None)
         number = numbers(f"{at}{row.name}", value, row.allowed)
-        if number.shape != () or not row.least <= number <= row.largest:
+        if number.shape != () or not row.smallest <= number <= row.largest:
             raise InputError(f"{at}{row.name}", value, row.allowed)
         values[row.name] = as_float64(number)
     return Uncertainty(**values)
@@ -90,11 +90,13 @@ def check_certain(
         return
     names = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
     if not families or not set(families) <= set(names):
-        raise InputError("uncertainty", None, f"must be absent but for the families {', '.join(names)}", fault="given")
+        raise InputError(
+            "uncertainty", None, f"must be absent but for the families {', '.join(names)}", problem="given"
+        )
     is_redundant = robot.n_cables != robot.dof and not all(FAMILIES[name].uncertain_redundancy for name in families)
     if is_redundant or in_pairs or robot.pulleys is not None:
         allowed = "must be absent on redundant cables (but for splines), on pairs of cables, and with pulleys"
-        raise InputError("uncertainty", None, allowed, fault="given")
+        raise InputError("uncertainty", None, allowed, problem="given")
     if not isinstance(robot, PlatformRobot) and float(uncertainty.mass_centre) > 0.0:
         raise InputError(
             "uncertainty.mass_centre", float(uncertainty.mass_centre), "absent: a point mass has no other one"
@@ -127,7 +129,7 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
         allowed = "must be below tension_max, each over the cable's share of it"
         first, second = (pairs.cables[pair] + 1).tolist()
         raise InputError(
-            "tension_min", None, allowed, fault=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
+            "tension_min", None, allowed, problem=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
         )
     return dataclasses.replace(limits, **values)
 

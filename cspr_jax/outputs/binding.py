@@ -46,7 +46,7 @@ def binding(
 def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
     # Slacks (m, 1), or (m, n_cables), of each criterion, as `verification.proved_answers` compares them.
     robot, limits = problem.robot, problem.limits
-    weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
     low, high = (np.asarray(side, float) for side in tension_range(robot, limits))
     tension = of_cables["tension"]
     rows = [(Verdict.SLACK_CABLE, (tension - low) / weight)]
@@ -62,7 +62,7 @@ def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray])
     }
     for row in other_limits(limits):
         limit = np.asarray(getattr(limits, row.name), float)
-        rows.append((row.flag, (limit - values[row.quantity]) / (size if row.unit == "m" else limit)))
+        rows.append((row.flag, (limit - values[row.quantity]) / (radius if row.unit == "m" else limit)))
     if judged_poses(robot)[1]:
-        rows.append((Verdict.ABOVE_SPOOLS, (state.position @ np.asarray(plane_normal(robot)))[:, None] / size))
+        rows.append((Verdict.ABOVE_SPOOLS, (state.position @ np.asarray(plane_normal(robot)))[:, None] / radius))
     return rows

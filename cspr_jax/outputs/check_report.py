@@ -25,7 +25,7 @@ RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_de
 
 def check_object(plan: PlannedMotions) -> dict[str, Any]:
     """The object that `cspr check --json` prints."""
-    answers, demands = plan.answers, plan.demands
+    answers, peaks = plan.answers, plan.demands
     case = shown_proof(plan)
     fields = {
         "schema": SCHEMA,
@@ -41,16 +41,16 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "not_tolerated": float(answers.not_tolerated[0]),
         "cause": [] if plan.feasible else [cause.to_dict() for cause in plan.causes[0]],
         **case.details,
-        "tension_min": float(demands.tension_min[0]),
-        "tension_max": float(demands.tension_max[0]),
+        "tension_min": float(peaks.tension_min[0]),
+        "tension_max": float(peaks.tension_max[0]),
         "tension_margin": float(answers.margin[0]) if plan.is_redundant else None,
-        "cable_length_max": float(demands.length_max[0]),
-        "cable_speed_max": float(demands.speed_max[0]),
-        "cable_acceleration_max": float(demands.acceleration_max[0]),
-        "speed_max": float(demands.mass_centre_speed[0]),
-        "acceleration_max": float(demands.mass_centre_acceleration[0]),
-        "z_lowest": float(demands.lowest[0]),
-        "demands": {CRITERIA[flag][0]: row for flag, row in _demands(plan, case).items()},
+        "cable_length_max": float(peaks.length_max[0]),
+        "cable_speed_max": float(peaks.speed_max[0]),
+        "cable_acceleration_max": float(peaks.acceleration_max[0]),
+        "speed_max": float(peaks.mass_centre_speed[0]),
+        "acceleration_max": float(peaks.mass_centre_acceleration[0]),
+        "z_lowest": float(peaks.lowest[0]),
+        "demands": {CRITERIA[flag][0]: row for flag, row in _peaks(plan, case).items()},
         "point": plan.point if plan.robot_file.is_platform else None,
         "interpolation": getattr(_motion(plan) or plan.keys, "interpolation", "function"),
         "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
@@ -68,7 +68,7 @@ def shown_proof(plan: PlannedMotions) -> MotionProof:
     return answers.proof[0]
 
 
-def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:
+def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:
     # The worst cable of each limit, with a bound that no instant exceeds.
     rows, worst = case.criteria, dict[Verdict, int]()
     for k in np.argsort(case.proof.high / case.scales).tolist():
@@ -91,13 +91,13 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
             **({"cables": list(rows[k].cables)} if len(rows[k].cables) > 1 else {}),
             "t": float(case.proof.when[k]),
         }
-    table |= _sampled_demands(plan)
+    table |= _sampled_peaks(plan)
     return {flag: table[flag] for flag in CRITERIA if flag in table}
 
 
-def _sampled_demands(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
+def _sampled_peaks(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
     # Extremes that no criterion of the proof has: found along the motion, without a bound.
-    demands, rows = plan.demands, dict[Verdict, tuple[str, str, Any]]()
+    peaks, rows = plan.demands, dict[Verdict, tuple[str, str, Any]]()
     if plan.is_redundant:
         low, high = tension_range(plan.problem.robot, plan.problem.limits)
         rows |= {Verdict.SLACK_CABLE: ("tension_min", "N", low), Verdict.OVER_TENSION: ("tension_max", "N", high)}
@@ -107,15 +107,15 @@ def _sampled_demands(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
         rows[Verdict.OVER_ACCELERATION] = ("mass_centre_acceleration", "m/s^2", None)
     table, count = {}, plan.problem.robot.n_cables
     for flag, (name, unit, allowed) in rows.items():
-        cable = int(demands.cables[0, EXTREMES.index(name)])
+        cable = int(peaks.cables[0, EXTREMES.index(name)])
         table[flag] = {
-            "value": float(getattr(demands, name)[0]),
+            "value": float(getattr(peaks, name)[0]),
             "bound": math.nan,
             "allowed": math.nan if allowed is None else float(np.broadcast_to(allowed, count)[cable]),
             "unit": unit,
             "sense": "at least" if flag == Verdict.SLACK_CABLE else "at most",
             "cable": cable if cable >= 0 else None,
-            "t": float(demands.when[0, EXTREMES.index(name)]),
+            "t": float(peaks.when[0, EXTREMES.index(name)]),
         }
     return table
 
@@ -192,7 +192,7 @@ def check_table(plan: PlannedMotions):
     heads = ("", "worst", "proved", "allowed", "unit", "cable", "at t (s)")
     for head in heads:
         table.add_column(cell(head), justify="left" if head in ("", "unit") else "right")
-    for flag, row in _demands(plan, case).items():
+    for flag, row in _peaks(plan, case).items():
         sign = "≥" if row["sense"] == "at least" else "≤"
         numbers = row.get("cables", [] if row["cable"] is None else [row["cable"]])
         cable = ", ".join(str(number + 1) for number in numbers) or "-"

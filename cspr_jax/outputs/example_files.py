@@ -12,9 +12,9 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 def folder() -> Path:
     """Folder of the examples: in the package where it was installed from a wheel, in the checkout beside it else."""
-    for place in (_PACKAGE / "examples", _PACKAGE.parent / "sweeps"):
-        if place.is_dir():
-            return place
+    for path in (_PACKAGE / "examples", _PACKAGE.parent / "sweeps"):
+        if path.is_dir():
+            return path
     raise StoreError(f"{_PACKAGE / 'examples'}: is missing: install cspr_jax again")
 
 
@@ -27,23 +27,23 @@ def examples() -> dict[str, str]:
     return purposes
 
 
-def copy(names: list[str], place: Path) -> list[Path]:
+def copy(names: list[str], target: Path) -> list[Path]:
     """Copy some of them; nothing is overwritten."""
-    known, source = examples(), folder()
+    purposes, source = examples(), folder()
     for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
+        if name not in purposes:
+            near = difflib.get_close_matches(name, purposes, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
             raise ConfigError("examples", f"{shown(name)}: {hint}must be one of those that `cspr examples` lists")
     # A plan of a path may come with a file of the path, of the same name.
     originals = [
         path for name in names for path in sorted(source.glob(f"{name}.*"), key=lambda path: path.suffix != ".toml")
     ]
-    copies = {path: place / path.name for path in originals}
+    copies = {path: target / path.name for path in originals}
     for path in copies.values():
         if path.exists():
             raise RefusedError(printable(f"{path}: is there already: remove it, or choose another folder with -o"))
-    make_folders(Disk(), place)
+    make_folders(Disk(), target)
     for original, path in copies.items():
         try:
             with path.open("xb") as file:

@@ -18,10 +18,10 @@ from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.proved_answers import MotionProof, cause_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
-# Share of its scale within which the smallest slack of a criterion is compared with what samples leave open.
+# Fraction of its scale within which the smallest slack of a criterion is compared with what samples leave open.
 NEAR = 1e-3
-# Instants in each piece, and pieces at most, at which motions are compared.
-INSTANTS, MOST_PIECES = 8, 256
+# Samples in each piece, and pieces at most, at which motions are compared.
+SAMPLES, MOST_PIECES = 8, 256
 
 
 class TouchedLimit(NamedTuple):
@@ -67,7 +67,7 @@ def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit
 
 def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -> tuple[float, float]:
     # The smallest slack of a criterion about where it fails or is smallest, and what every second sample changes there.
-    taus = _instants(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
+    taus = _sample_times(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
     scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"), trajectory=plan.keys)
 
     def slacks(curve: Spline) -> np.ndarray:
@@ -79,12 +79,12 @@ def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -
     return min(float(fine.min()), float(case.proof.high[k])), float(away.max())
 
 
-def _instants(knots: np.ndarray, failing: np.ndarray, when: float) -> np.ndarray:
+def _sample_times(knots: np.ndarray, failing: np.ndarray, when: float) -> np.ndarray:
     # Normalised times within the pieces in which a criterion fails, or is smallest, and within their neighbours.
     spans = np.concatenate([failing, [[when, when]]])
     first, last = (np.searchsorted(knots, side) for side in spans.T)
     pieces = np.unique(np.concatenate([np.arange(i - 2, j + 2) for i, j in zip(first, last, strict=True)]))
     pieces = pieces[(pieces >= 0) & (pieces < len(knots) - 1)]
     pieces = pieces[np.unique(np.linspace(0, len(pieces) - 1, MOST_PIECES).astype(int))]
-    shares = (np.arange(INSTANTS) + 0.5) / INSTANTS
-    return (knots[pieces, None] + np.diff(knots)[pieces, None] * shares).ravel() / knots[-1]
+    fractions = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    return (knots[pieces, None] + np.diff(knots)[pieces, None] * fractions).ravel() / knots[-1]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.config import catalogue
-from cspr_jax.config.catalogue import FAULTS, catalogue_keys, catalogue_names
+from cspr_jax.config.catalogue import REST_ERRORS, catalogue_names, catalogue_specs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
@@ -24,11 +24,11 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
         robot_file = resolve_robot(str(name), "robots", Path())
         is_known = robot_file.file is not None and robot_file.file.parent == catalogue.CATALOGUE
         if is_known:
-            error = FAULTS.get(robot_file.name)
+            error = REST_ERRORS.get(robot_file.name)
         else:
-            from cspr_jax.build.robots import fault_at_rest  # imports jax
+            from cspr_jax.build.robots import error_at_rest  # imports jax
 
-            error = fault_at_rest(robot_file)
+            error = error_at_rest(robot_file)
         listed.append(robot_file.model_dump(exclude_none=True) | {"fault": error})
     return listed
 
@@ -37,29 +37,29 @@ def catalogue_table():
     """The catalogue for a terminal, one line a robot."""
     rows = [
         (
-            keys["name"],
-            str(len(keys["base_points"])),
-            _pattern(keys),
-            f"{keys['mass']:g}",
-            keys.get("z_axis", "down"),
-            ", ".join(_remarks(keys)),
+            spec["name"],
+            str(len(spec["base_points"])),
+            _pattern(spec),
+            f"{spec['mass']:g}",
+            spec.get("z_axis", "down"),
+            ", ".join(_remarks(spec)),
         )
-        for keys in catalogue_keys()
+        for spec in catalogue_specs()
     ]
     table = _table(("name", "cables", "moves", "kg", "z", "remarks"), rows, wraps=False)
     table.caption, table.caption_justify = "cspr robots NAME shows all about one", "left"
     return table
 
 
-def _pattern(keys: dict[str, Any]) -> str:
-    usual = "3R3T" if "platform_points" in keys else "2T" if keys.get("planar") else "3T"
-    return str(keys.get("pattern", usual))
+def _pattern(spec: dict[str, Any]) -> str:
+    usual = "3R3T" if "platform_points" in spec else "2T" if spec.get("planar") else "3T"
+    return str(spec.get("pattern", usual))
 
 
-def _remarks(keys: dict[str, Any]) -> list[str]:
-    remarks = [PLACEHOLDER] if keys.get("source", "").startswith(PLACEHOLDER) else []
-    remarks += ["translates"] if keys.get("translation_only") else []
-    return remarks + (["cannot hang taut"] if keys["name"] in FAULTS else [])
+def _remarks(spec: dict[str, Any]) -> list[str]:
+    remarks = [PLACEHOLDER] if spec.get("source", "").startswith(PLACEHOLDER) else []
+    remarks += ["translates"] if spec.get("translation_only") else []
+    return remarks + (["cannot hang taut"] if spec["name"] in REST_ERRORS else [])
 
 
 def robot_details(robot: dict[str, Any]):

@@ -18,7 +18,7 @@ from cspr_jax.motion.acceleration_sets import along
 from cspr_jax.motion.motion import Motion, common_shape, outward
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.binding import binding
-from cspr_jax.outputs.path_columns import path_columns
+from cspr_jax.outputs.paths import path_columns
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
@@ -73,9 +73,9 @@ def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_coupl
         if with_couples:
             of_cables["tension_couple"] = tension_couples(robot, state.position, state.acceleration)
         if isinstance(motion, TimedLine):
-            way = motion.direction / jnp.linalg.norm(motion.direction)
-            minimum, largest = along(robot, limits, state.position, way)
-            of_cables["path_acceleration"] = jnp.stack([minimum, way @ state.acceleration, largest])
+            direction = motion.direction / jnp.linalg.norm(motion.direction)
+            minimum, largest = along(robot, limits, state.position, direction)
+            of_cables["path_acceleration"] = jnp.stack([minimum, direction @ state.acceleration, largest])
         return state, of_cables
 
     return jax.vmap(one)(tau)
@@ -111,7 +111,7 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
 
 
 def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
-    """States at given instants of the segments of a plan."""
+    """States at given times of the segments of a plan."""
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     robot = plan.problem.robot
@@ -184,8 +184,8 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
             ("couple", "tension_couple"),
             ("bound", "path_acceleration"),
         )
-        for name, needs in needing:
-            if needs in columns:
+        for name, quantity in needing:
+            if quantity in columns:
                 scales[name] = list(PARTS[name])
         for name, labels in scales.items():
             file[name] = labels

@@ -31,7 +31,7 @@ def write_json(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
     fields: dict[str, Any] = rows_object(plan, rate) if is_motion else {"rows": {"t": [None]}}
     if any(None in np.ravel(values) for name, values in fields["rows"].items() if name not in OPEN):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
-    known = attributes(plan)
-    beside = {name: known[name] for name in BESIDE if name in known} | {"feasible": plan.feasible}
+    named = attributes(plan)
+    beside = {name: named[name] for name in BESIDE if name in named} | {"feasible": plan.feasible}
     text = json.dumps({"schema": SCHEMA, **beside, **fields}, allow_nan=False)
     publish(Disk(), path, f"{text}\n".encode())

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from cspr_jax.outputs.path_lines import path_lines
+from cspr_jax.outputs.paths import path_lines
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
@@ -13,7 +13,7 @@ from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
-# Places can be copied into a plan: P0 is at rest to 1e-9 of the robot's size.
+# Positions can be copied into a plan: P0 is at rest to 1e-9 of the robot's size.
 DIGITS = 12
 
 
@@ -33,7 +33,7 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
-    return finite(fields | {outcome.key: outcome.to_dict() for outcome in plan.outcomes})
+    return finite(fields | {result.key: result.to_dict() for result in plan.outcomes})
 
 
 def axes_text(plan: PlannedMotions) -> str:
@@ -86,7 +86,7 @@ _OF_SOME = (
 
 
 def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
-    answers, demands = plan.answers, plan.demands
+    answers, peaks = plan.answers, plan.demands
     arcs = int(answers.arcs[i])
     fields = {
         "from": i,
@@ -95,27 +95,27 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "arcs": arcs or None,
         "tried_arcs": int(answers.tried_arcs[i]),
         "duration": float(answers.duration[i]),
-        "tension_min": float(demands.tension_min[i]),
-        "tension_max": float(demands.tension_max[i]),
-        "mu_min": float(demands.mu_min[i]),
+        "tension_min": float(peaks.tension_min[i]),
+        "tension_max": float(peaks.tension_max[i]),
+        "mu_min": float(peaks.mu_min[i]),
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
         "tolerated": float(answers.tolerated[i]),
         "not_tolerated": float(answers.not_tolerated[i]),
         "tension_margin": _tension_margin(plan, i),
-        "det_sign_constant": bool(demands.depth_min[i] > 0.0),
+        "det_sign_constant": bool(peaks.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
         "cause": None if plan.is_feasible[i] else [cause.to_dict() for cause in plan.causes[i]],
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
-        "z_lowest": float(demands.lowest[i]),
-        "cable_length_max": float(demands.length_max[i]),
-        "cable_speed_max": float(demands.speed_max[i]),
-        "cable_acceleration_max": float(demands.acceleration_max[i]),
-        "speed_max": float(demands.mass_centre_speed[i]),
-        "acceleration_max": float(demands.mass_centre_acceleration[i]),
-        "samples": int(demands.samples[i]),
+        "z_lowest": float(peaks.lowest[i]),
+        "cable_length_max": float(peaks.length_max[i]),
+        "cable_speed_max": float(peaks.speed_max[i]),
+        "cable_acceleration_max": float(peaks.acceleration_max[i]),
+        "speed_max": float(peaks.mass_centre_speed[i]),
+        "acceleration_max": float(peaks.mass_centre_acceleration[i]),
+        "samples": int(peaks.samples[i]),
     }
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i) | {"margin_unit": plan.margin_unit(i)}
 
@@ -148,10 +148,10 @@ def plan_table(plan: PlannedMotions):
     title = f"{plan.robot_file.name}: {', '.join(filter(None, words))}"
     segments = plan_object(plan)["segments"]
     lines = [*_caption(plan).splitlines(), *path_lines(segments)]
-    lines += [line for outcome in plan.outcomes for line in outcome.lines()]
+    lines += [line for result in plan.outcomes for line in result.lines()]
     table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
     table.caption = cell(*lines, style="table.caption")
-    columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
+    columns = {**_positions(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
     for head in columns:
         table.add_column(cell(head), justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
     for segment in segments:
@@ -162,10 +162,10 @@ def plan_table(plan: PlannedMotions):
 Column = Callable[[dict[str, Any]], str]
 
 
-def _places(plan: PlannedMotions) -> dict[str, Column]:
+def _positions(plan: PlannedMotions) -> dict[str, Column]:
     def position(segment: dict[str, Any]) -> str:
         pose = plan.keys.pose[segment["to"]]
-        # The end of a launch follows from the launch: nobody gives that place.
+        # The end of a launch follows from the launch: nobody gives that position.
         digits = DIGITS if pose.rest or pose.position is not None else 4
         return f"({', '.join(f'{round(value, DIGITS) + 0.0:.{digits}g}' for value in plan.points[segment['to']])})"
 

@@ -70,12 +70,12 @@ def grid(
     reading = reading if reading in variants else ""
     variants.sort(key=lambda name: name != reading)
     blocks: list[Any] = []
-    reasons: dict[str, str] = {}  # mark of each
+    reasons: dict[str, str] = {}  # letter of each
     for name in variants:
         cells_of_variant = [cell for cell in cells if cell.variant == name]
-        marks = {cell: _mark(reason(cell), reasons) for cell in cells_of_variant if cell.differs}
+        letters = {cell: _letter(reason(cell), reasons) for cell in cells_of_variant if cell.differs}
         if reading and name != reading and not is_full:
-            blocks.append(terminal.cell(_in_a_line(name, cells_of_variant, marks)))
+            blocks.append(terminal.cell(_in_a_line(name, cells_of_variant, letters)))
             continue
         words = f"{name} (the reading that the printed numbers fit)" if name and name == reading else name
         blocks += [terminal.cell(words, style="bold")] if name else []
@@ -84,24 +84,24 @@ def grid(
         for first in range(0, len(across), step):
             heads_of_block = across[first : first + step]
             part = [cell for cell in cells_of_variant if (cell.row if transposed else cell.column) in heads_of_block]
-            blocks.append(_block(part, transposed, _HEADS | dict(heads), marks))
-    lines = [terminal.cell(f"{mark}: {text}") for text, mark in reasons.items()]
+            blocks.append(_block(part, transposed, _HEADS | dict(heads), letters))
+    lines = [terminal.cell(f"{letter}: {text}") for text, letter in reasons.items()]
     return Group(terminal.cell(title, style="italic"), *blocks, *lines, terminal.cell(LEGEND, style="dim"))
 
 
-def _mark(text: str, reasons: dict[str, str]) -> str:
+def _letter(text: str, reasons: dict[str, str]) -> str:
     # Reasons are lettered in the order in which they appear.
     return reasons.setdefault(text, f"[{chr(ord('a') + len(reasons))}]") if text else ""
 
 
-def _in_a_line(name: str, cells: list[Cell], marks: Mapping[Cell, str]) -> str:
+def _in_a_line(name: str, cells: list[Cell], letters: Mapping[Cell, str]) -> str:
     printed = [cell for cell in cells if cell.printed]
-    listed = " ".join(sorted({mark for mark in marks.values() if mark}))
-    words = f"{len(marks)} of {len(printed)} cells differ {listed}".rstrip() if marks else "no cell differs"
+    listed = " ".join(sorted({letter for letter in letters.values() if letter}))
+    words = f"{len(letters)} of {len(printed)} cells differ {listed}".rstrip() if letters else "no cell differs"
     return f"{name}: {words}"
 
 
-def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str], marks: Mapping[Cell, str]) -> Any:
+def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str], letters: Mapping[Cell, str]) -> Any:
     from rich.table import Table
 
     table = Table()
@@ -111,17 +111,17 @@ def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str], marks:
     for name in columns:
         table.add_column(terminal.cell(heads.get(name, name)), justify="right", no_wrap=True)
     for row in rows:
-        known = [by.get((row, column)) for column in columns]
-        texts = [terminal.cell("") if one is None else _text(one, cells, marks.get(one, "")) for one in known]
+        cells_of_row = [by.get((row, column)) for column in columns]
+        texts = [terminal.cell("") if one is None else _text(one, cells, letters.get(one, "")) for one in cells_of_row]
         table.add_row(terminal.cell(heads.get(row, row)), *texts)
     return table
 
 
-def _text(cell: Cell, cells: list[Cell], mark: str) -> Any:
+def _text(cell: Cell, cells: list[Cell], letter: str) -> Any:
     text = f"{cell.printed or UNKNOWN} / {computed_text(cell, cells)}"
     if not cell.differs:
         return terminal.cell(text)
-    return terminal.cell(f"{text} {MISMATCH} {mark}".rstrip(), style="bold red")
+    return terminal.cell(f"{text} {MISMATCH} {letter}".rstrip(), style="bold red")
 
 
 def computed_text(cell: Cell, cells: list[Cell]) -> str:
@@ -130,8 +130,8 @@ def computed_text(cell: Cell, cells: list[Cell]) -> str:
         return NOTHING
     printed = [other.printed for other in cells if other.column == cell.column and other.printed]
     if cell.printed or printed:
-        places = _decimals(cell.printed) if cell.printed else min(map(_decimals, printed))
-        return f"{round(cell.computed, places) + 0.0:.{places}f}"  # no -0
+        decimals = _decimals(cell.printed) if cell.printed else min(map(_decimals, printed))
+        return f"{round(cell.computed, decimals) + 0.0:.{decimals}f}"  # no -0
     return f"{cell.computed:.0f}" if abs(cell.computed) >= 1000.0 else f"{cell.computed:.4g}"
 
 

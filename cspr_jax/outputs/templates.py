@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from cspr_jax.config import catalogue
 from cspr_jax.config.formats.writing import value_text
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
@@ -55,7 +55,7 @@ def sweep_template(kind: str) -> str:
     alike = (name for name, other in MAP_KINDS.items() if name in examples and other.families == row.families)
     values = dict(examples[kind if kind in examples else next(alike)], map=kind)
     # Keys that only other kinds have are refused.
-    special = (*SurroundingsKeys.model_fields, *(key for other in MAP_KINDS.values() for key in other.keys))
+    special = (*ObstacleKeys.model_fields, *(key for other in MAP_KINDS.values() for key in other.keys))
     refused = frozenset(special) - frozenset(row.keys)
     for key in refused:
         table, _, name = key.partition(".")

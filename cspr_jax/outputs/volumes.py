@@ -73,27 +73,27 @@ class WorkspaceVolume:
             a line for each value of the other axes.
         """
         texts = []
-        for place in np.ndindex(self.volume.shape):
+        for index in np.ndindex(self.volume.shape):
             at = ", ".join(
-                f"{name} {points[i]:.6g}" for (name, points), i in zip(self.axes.items(), place, strict=True)
+                f"{name} {points[i]:.6g}" for (name, points), i in zip(self.axes.items(), index, strict=True)
             )
-            text = f"{self.volume[place]:.6g} {self.units}, give or take {self.error[place]:.3g}"
-            if self.proved_fraction[place] > 0.0:
+            text = f"{self.volume[index]:.6g} {self.units}, give or take {self.error[index]:.3g}"
+            if self.proved_fraction[index] > 0.0:
                 text += (
-                    f"; proved between {self.least[place]:.6g} and {self.most[place]:.6g}, "
-                    f"{100.0 * self.proved_fraction[place]:.4g} % of the grid"
+                    f"; proved between {self.least[index]:.6g} and {self.most[index]:.6g}, "
+                    f"{100.0 * self.proved_fraction[index]:.4g} % of the grid"
                 )
-            parts = [(values[place], OPEN_WORDS[name]) for name, values in self.open_fractions.items()]
+            parts = [(values[index], OPEN_WORDS[name]) for name, values in self.open_fractions.items()]
             words = ", ".join(f"{100.0 * part:.3g} % {word}" for part, word in sorted(parts)[::-1] if part > 0.0)
             if words:
                 text += f"; open: {words}"
-            if self.uncertain[place] > 0.0:
+            if self.uncertain[index] > 0.0:
                 text += (
-                    f"; {self.uncertain[place]:.4g} {self.units} more for the robot as it is described, but not for "
+                    f"; {self.uncertain[index]:.4g} {self.units} more for the robot as it is described, but not for "
                 )
                 text += "every robot within its uncertainty"
-            if self.undecided_fraction[place] > 0.0:
-                text += f"; {100.0 * self.undecided_fraction[place]:.4g} % of the grid undecided"
+            if self.undecided_fraction[index] > 0.0:
+                text += f"; {100.0 * self.undecided_fraction[index]:.4g} % of the grid undecided"
             texts.append(f"{at}: {text}" if at else text)
         return texts
 
@@ -101,11 +101,11 @@ class WorkspaceVolume:
 def volume_of(result: Result) -> WorkspaceVolume:
     """Volume of the workspace that a map has found, or its area where the map is a section."""
     if not result.is_map or "verdict" not in result.data:
-        raise InputError("result", None, "must be a map that stores verdict", fault="no verdicts")
+        raise InputError("result", None, "must be a map that stores verdict", problem="no verdicts")
     names, axes = list(result.axes), POLAR if "radius" in result.axes else LEVEL
     spread = [name for name in axes if len(result.axes.get(name, ())) > 1]
     if not spread:
-        raise InputError("result", None, "must have two places or more", fault="a single place")
+        raise InputError("result", None, "must have two places or more", problem="a single place")
     order = [names.index(name) for name in spread]
     others = [i for i in range(len(names)) if names[i] not in spread]
     weights = _weights([_widths(result.axes[name], name) for name in spread])

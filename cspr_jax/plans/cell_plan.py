@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.keys.ellipse import SweepEllipse, cell_axes
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.path import SAME_PLACE, TargetPath
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.plan import PlanFile
@@ -56,7 +56,7 @@ def cell_plan(
         target["arcs"] = count
     plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **trajectory_keys, **depth}
     plan["pose"] = [_start(settings, place), target]
-    return plan | {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
+    return plan | {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
 
 
 def _turn(
@@ -86,7 +86,7 @@ def _path(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping
     if path is None:
         return None
     target = {**start, "position": end, "path": path.model_dump(mode="json", exclude_none=True)}
-    surroundings = {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
+    surroundings = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
     return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **surroundings}
 
 
@@ -96,7 +96,7 @@ def _free(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping
     if "position" in start and math.dist(start["position"], end) <= SAME_PLACE:
         return None
     target = {name: value for name, value in start.items() if name != "rest"} | {"position": end}
-    surroundings = {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
+    surroundings = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
     return {"schema": 1, "robot": settings["robot"], **keys, "pose": [start, target], **surroundings}
 
 

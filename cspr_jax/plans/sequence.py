@@ -70,7 +70,9 @@ class PlanLegs:
 def _judged(leg: Leg) -> Leg:
     waypoints = leg.waypoints
     return judged(
-        leg, surroundings=bool(waypoints.plan_file.surroundings), pulleys=waypoints.robot_file.pulley_radius is not None
+        leg,
+        surroundings=bool(waypoints.plan_file.obstacle_keys),
+        pulleys=waypoints.robot_file.pulley_radius is not None,
     )
 
 

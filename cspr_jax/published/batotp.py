@@ -41,11 +41,11 @@ def sample() -> dict[str, Any]:
 
 def least_time(cells: int = CELLS) -> dict[Key, float | None]:
     """The proved time along the path, beside both printed ones, and the lower bound of all motions' times."""
-    keys = sample()
-    robot, frame = centred(point_mass_robot(keys["base_points"], mass=1.0, gravity=keys["gravity"]))
-    problem = Problem(robot, _limits(keys["limits"], robot.n_cables), named("quintic"))
-    segments = np.arange(float(len(keys["points"])))
-    powers = np.moveaxis(CubicSpline(segments, keys["points"]).c[::-1], 0, 1)
+    spec = sample()
+    robot, frame = centred(point_mass_robot(spec["base_points"], mass=1.0, gravity=spec["gravity"]))
+    problem = Problem(robot, _limits(spec["limits"], robot.n_cables), named("quintic"))
+    segments = np.arange(float(len(spec["points"])))
+    powers = np.moveaxis(CubicSpline(segments, spec["points"]).c[::-1], 0, 1)
     curve = Spline(as_float64(segments), as_float64(frame.inward(bernstein_of_powers(powers))), None)
     section = Section(curve, np.full(len(powers), np.inf), segments)
     minimum = least_time_motion(problem, section, SectionSettings(cells, 0.0))
@@ -55,15 +55,15 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
     return values | {("least time along the path", "lower bound, s", VARIANT): bound}
 
 
-def _limits(keys: dict[str, float], n_cables: int) -> Limits:
+def _limits(spec: dict[str, float], n_cables: int) -> Limits:
     # The effector has 1 kg, so that tensions over the mass are tensions.
     def of_cables(name: str):
-        return as_float64(np.full(n_cables, keys[name]))
+        return as_float64(np.full(n_cables, spec[name]))
 
     return Limits(
         tension_min=of_cables("tension_min_per_mass"),
         tension_max=of_cables("tension_max_per_mass"),
         cable_speed_max=of_cables("cable_speed_max"),
         cable_acceleration_max=of_cables("cable_acceleration_max"),
-        speed_max=as_float64(keys["speed_max"]),
+        speed_max=as_float64(spec["speed_max"]),
     )

@@ -31,24 +31,24 @@ EXACT_TIMES, ROUNDED_TIMES = "exact T and p", "T and p of three decimals"
 
 
 class PublishedLine(NamedTuple):
-    """A boundary of the path acceleration: start + slope * s.
+    """A boundary of the path acceleration: start + gradient * s.
 
     Fields:
         start: 1/s^2.
-        slope: 1/s^2.
+        gradient: 1/s^2.
     """
 
     start: float
-    slope: float
+    gradient: float
 
 
 def _case() -> tuple[Sides, float]:
     # Bounds of the path acceleration of the test case, and the largest one.
-    keys = read_plan(read_text(CASE), CASE)
-    robot_file = resolve_robot(keys.robot, CASE, CASE.parent)
-    start, end = PlanLegs(robot_file, keys, CASE).waypoints.points(float("nan"))
-    largest = float(keys.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
-    robot = kernel_robot(robot_file, keys, CASE, any_cables=True)
+    spec = read_plan(read_text(CASE), CASE)
+    robot_file = resolve_robot(spec.robot, CASE, CASE.parent)
+    start, end = PlanLegs(robot_file, spec, CASE).waypoints.points(float("nan"))
+    largest = float(spec.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
+    robot = kernel_robot(robot_file, spec, CASE, any_cables=True)
     return jax.tree.map(np.asarray, _bounds(robot, start, end, jnp.asarray(largest))), largest
 
 
@@ -57,26 +57,26 @@ def _bounds(robot: PointMassRobot, start: Array, end: Array, largest: Array) -> 
     return sides(line_faces(robot, start, end, in_plane=True), largest)
 
 
-_least = jax.jit(least_s_curve)
+_minimum_curve = jax.jit(least_s_curve)
 _laws = jax.jit(jax.vmap(s_curve))
 
 
 def _active() -> tuple[PublishedLine, PublishedLine, float]:
     # (24) and (25): the boundaries that hold the least time back, and the largest path acceleration.
     bounds, largest = _case()
-    minimum = _least(bounds)
+    minimum = _minimum_curve(bounds)
     up, down = int(minimum.up), int(minimum.down)
     # Braking is seen from the end.
-    slope = float(bounds.down_slope[down])
-    lower = PublishedLine(-float(bounds.down[down]) - slope, slope)
+    gradient = float(bounds.down_slope[down])
+    lower = PublishedLine(-float(bounds.down[down]) - gradient, gradient)
     return PublishedLine(float(bounds.up[up]), float(bounds.up_slope[up])), lower, largest
 
 
 def table_4_1() -> dict[Key, float | None]:
     """All solutions of (28) and (29) for T and p."""
-    (b, m), (low, slope), _ = _active()
-    brake = -(low + slope)
-    ratios = np.roots([(m - slope) / 6.0, b + brake + slope / 3.0, -brake - slope / 6.0])
+    (b, m), (low, gradient), _ = _active()
+    brake = -(low + gradient)
+    ratios = np.roots([(m - gradient) / 6.0, b + brake + gradient / 3.0, -brake - gradient / 6.0])
     cells: dict[Key, float | None] = {}
     for ratio in np.sort(ratios.real):
         square = 4.0 / (ratio * (b + m * ratio / 6.0))
@@ -90,7 +90,7 @@ def table_4_1() -> dict[Key, float | None]:
 
 def table_4_2() -> dict[Key, float | None]:
     """The acceleration s'' = slope t + intercept of the least time, range by range."""
-    minimum = _least(_case()[0])
+    minimum = _minimum_curve(_case()[0])
     exact = float(minimum.duration), float(minimum.duration * minimum.ratio)
     cells: dict[Key, float | None] = {}
     for reading, (time, p) in ((EXACT_TIMES, exact), (ROUNDED_TIMES, tuple(np.round(exact, 3)))):
@@ -133,7 +133,7 @@ def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple
     def beyond(line: PublishedLine) -> np.ndarray:
         constant = np.zeros((4, 1, 1))
         constant[0] = line.start
-        return second_derivative - line.slope * s - constant
+        return second_derivative - line.gradient * s - constant
 
     level, shape = (PublishedLine(largest, 0.0), PublishedLine(-largest, 0.0)), (len(TIMES), len(PERIODS))
     over = np.maximum(_largest(beyond(upper), spans), _largest(beyond(level[0]), spans)).max(1)
@@ -145,8 +145,8 @@ def _largest(curve: np.ndarray, spans: np.ndarray) -> np.ndarray:
     # Return the largest values of cubics without a square, (4, n, n_pieces), over their spans, (2, n, n_pieces).
     square = -curve[1] / np.where(curve[3] != 0.0, 3.0 * curve[3], np.inf)
     stationary = np.sqrt(np.maximum(square, 0.0))
-    places = np.clip(np.stack([spans[0], spans[1], stationary, -stationary]), spans[0], spans[1])
-    return (curve[0] + places * (curve[1] + places**2 * curve[3])).max(0)
+    points = np.clip(np.stack([spans[0], spans[1], stationary, -stationary]), spans[0], spans[1])
+    return (curve[0] + points * (curve[1] + points**2 * curve[3])).max(0)
 
 
 def _printed() -> dict[Key, str]:

@@ -1,4 +1,4 @@
-"""Table 3.3 of the thesis: accessible orientations of a place, and how many of them are attainable.
+"""Table 3.3 of the thesis: accessible orientations of a position, and how many of them are attainable.
 
 Sets of orientations are found and tried by one process or by several; Table 3.4 (`table_3_4`) asks for them too.
 """
@@ -32,13 +32,13 @@ from cspr_jax.runtime.stages import within
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20
 DIVISIONS = 32  # of pi
-TOGETHER = 1_000_000  # orientations are tried at a time, or some more: places stay whole
+TOGETHER = 1_000_000  # orientations are tried at a time, or some more: positions are not split
 AMPLITUDES: dict[str, tuple[str, float | None]] = {
     "quintic": ("quintic", None),
     "effective": ("effective", 0.1),
     "effective-c3": ("effective-c3", 0.1),
 }
-PLACES = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
+POSITIONS = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
 DEPTH = 1.7
 
 
@@ -87,14 +87,14 @@ def attained(
     tried: np.ndarray | None = None,
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain; the centroid of the spools is the origin."""
-    sizes = [len(angles) for _, angles in sets]
-    places = np.repeat([place for place, _ in sets], sizes, axis=0)
+    orientation_counts = [len(angles) for _, angles in sets]
+    positions = np.repeat([position for position, _ in sets], orientation_counts, axis=0)
     symmetry = symmetries(checker.problem.robot)
     orientations = np.concatenate([angles for _, angles in sets])
-    z0 = places[:, 2]
+    z0 = positions[:, 2]
     good = attainable.attained(
         checker,
-        places,
+        positions,
         orientations,
         z0,
         tried=tried,
@@ -102,11 +102,11 @@ def attained(
         max_arcs=choice.max_arcs,
         values=choice.values,
     )
-    return np.split(good, np.cumsum(sizes)[:-1])
+    return np.split(good, np.cumsum(orientation_counts)[:-1])
 
 
 def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarray, int]]) -> list[Accessible]:
-    """Accessible orientations of places, in whichever process."""
+    """Accessible orientations of positions, in whichever process."""
     with double_precision():
         return accessible_sets(checker_of(amplitude).problem.robot, grids, definition)
 
@@ -115,13 +115,13 @@ def attained_there(
     amplitude: str, choice: TableSettings, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain, in whichever process."""
-    run = np.cumsum(sizes(sets)) // TOGETHER
+    run = np.cumsum(orientation_counts(sets)) // TOGETHER
     with double_precision():
         groups = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
         return [good for group in groups for good in attained(checker_of(amplitude), group, choice=choice, tried=tried)]
 
 
-def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
+def orientation_counts(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
     """Numbers of orientations, by which work on sets is spread."""
     return [len(angles) for _, angles in sets]
 
@@ -131,17 +131,17 @@ def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
     cells: dict[Key, float | None] = {}
     # The step of the table, and twice that for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]
-    places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
+    positions = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in POSITIONS.values()]
     with Spread(workers) as spread:
         for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
             with within(f"{amplitude}, {definition}"):
                 # All sets go together, so that batches are full.
-                requests = [(place, n) for n in steps for place in places]
+                requests = [(position, n) for n in steps for position in positions]
                 sets = spread(partial(accessible_there, amplitude, definition), requests, [n**3 for _, n in requests])
-                angles = [(place, inside.angles) for (place, _), inside in zip(requests, sets, strict=True)]
-                masks = spread(partial(attained_there, amplitude, choice, None), angles, sizes(angles))
+                angles = [(position, inside.angles) for (position, _), inside in zip(requests, sets, strict=True)]
+                masks = spread(partial(attained_there, amplitude, choice, None), angles, orientation_counts(angles))
             rows = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
-            for row, fine, coarse in zip(PLACES, rows[: len(places)], rows[len(places) :], strict=True):
+            for row, fine, coarse in zip(POSITIONS, rows[: len(positions)], rows[len(positions) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
                 cells |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
     return cells

@@ -1,4 +1,4 @@
-"""Workspaces that papers on other tools compute: counts of poses, and times beside other ways to the same answers.
+"""Workspaces that papers on other tools compute: counts of poses, and times beside other methods.
 
 The grids are those of CASPR (Lau et al., IROS 2016, Table I: IPAnema 2, wrench closure, for which it prints 89 to
 455 s), of CASPR's model of IPAnema 1, and of the CoGiRo robot in cdpyr. No source prints the counts of poses.
@@ -69,8 +69,10 @@ def grids() -> list[PoseGrid]:
             PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _quaternions(poses[:, 3:]))
         )
     cube = _product(np.linspace(-6.0, 6.0, 10), np.linspace(-4.0, 4.0, 10), np.linspace(0.0, 4.0, 10))
-    still = np.repeat(_quaternions(np.zeros((1, 3))), len(cube), axis=0)
-    studies += [PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
+    upright = np.repeat(_quaternions(np.zeros((1, 3))), len(cube), axis=0)
+    studies += [
+        PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, upright) for condition in (FEASIBLE, STATIC)
+    ]
     return studies
 
 
@@ -92,31 +94,31 @@ def _row(grid: PoseGrid) -> dict[str, float]:
     centred_robot, frame = centred(robot)
     demand = requirement(centred_robot, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
     quaternions = frame.rotated_quaternions(grid.quaternions)
-    places = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), quaternions)
+    centres = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), quaternions)
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, demand)
-    answers = search(places, quaternions)
-    count, seconds = len(places), time.perf_counter() - start
+    answers = search(centres, quaternions)
+    count, seconds = len(centres), time.perf_counter() - start
     sample = np.linspace(0, count - 1, min(SAMPLE, count)).astype(int)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places[sample], quaternions[sample]))
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, centres[sample], quaternions[sample]))
     matrices = matrices / search.unit[:, None]
-    wrench = search.required(places[0], quaternions[0]).corners[0]
+    wrench = search.required(centres[0], quaternions[0]).corners[0]
     limits = (None, None) if grid.condition == CLOSURE else (demand.low, demand.high)
-    inside, clear = answers.verdict[sample] == 0, np.abs(answers.margin[sample]) > CLOSE * _size(demand)
+    inside, clear = answers.verdict[sample] == 0, np.abs(answers.margin[sample]) > CLOSE * _magnitude(demand)
     numbers = {
         "poses": float(count),
         "inside": float((answers.verdict == 0).sum()),
         "on the boundary": float((answers.verdict == Verdict.UNDECIDED).sum()),
         "us a pose": MICRO * seconds / count,
     }
-    for name, way in (("HiGHS", by_program), ("NNLS", by_squares)):
+    for name, decide in (("HiGHS", by_program), ("NNLS", by_squares)):
         start = time.perf_counter()
-        verdicts = np.array([way(matrix, wrench, *limits) for matrix in matrices])
+        verdicts = np.array([decide(matrix, wrench, *limits) for matrix in matrices])
         numbers[f"us, {name}"] = MICRO * (time.perf_counter() - start) / len(sample)
         numbers[f"differ, {name}"] = float(((verdicts != inside) & clear).sum())
     return numbers
 
 
-def _size(demand: Requirement) -> float:
+def _magnitude(demand: Requirement) -> float:
     finite = demand.high[np.isfinite(demand.high)]
-    return 1.0 if demand.condition == CLOSURE else float(max([*demand.low, *finite, demand.wrenches.size]))
+    return 1.0 if demand.condition == CLOSURE else float(max([*demand.low, *finite, demand.wrenches.magnitude]))

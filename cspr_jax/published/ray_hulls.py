@@ -52,15 +52,15 @@ def hulls() -> dict[Key, float | None]:
 def hull(inside: Inside, divisions: int) -> tuple[float, float]:
     """Volume and surface of a hull."""
     triangles = _directions(divisions)
-    ways, places = np.unique(triangles.reshape(-1, 3).round(12), axis=0, return_inverse=True)
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    low, high = np.zeros(len(ways)), np.full(len(ways), LONGEST)
-    reach = high
+    directions, indices = np.unique(triangles.reshape(-1, 3).round(12), axis=0, return_inverse=True)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    low, high = np.zeros(len(directions)), np.full(len(directions), LONGEST)
+    radius = high
     while high[0] - low[0] > CLOSE:  # the same on all rays
-        holds = inside(CENTRE + reach[:, None] * ways)
-        low, high = np.where(holds, reach, low), np.where(holds, high, reach)
-        reach = 0.5 * (low + high)
-    a, b, c = np.moveaxis((reach[:, None] * ways)[places.reshape(-1, 3)], 1, 0)
+        holds = inside(CENTRE + radius[:, None] * directions)
+        low, high = np.where(holds, radius, low), np.where(holds, high, radius)
+        radius = 0.5 * (low + high)
+    a, b, c = np.moveaxis((radius[:, None] * directions)[indices.reshape(-1, 3)], 1, 0)
     volume = np.einsum("ni,ni->n", np.cross(a, b), c).sum() / 6.0
     return float(volume), float(0.5 * np.linalg.norm(np.cross(a - b, a - c), axis=1).sum())
 

@@ -34,7 +34,7 @@ READINGS = {
     "4.3": "boundaries of five decimals",
 }
 _COUNTS = "the counts depend on how orientations are counted, and no reading of the text gives the printed ones"
-_SHARES = (
+_PROPORTIONS = (
     "proportions depend on the amplitude function (see Table 3.2), and on the arcs and values of beta-hat that are "
     "tried, which the text does not say"
 )
@@ -72,8 +72,8 @@ REASONS: dict[str, tuple[Reason, ...]] = {
         ),
         Reason("fewer arcs than printed are found feasible", ("5",)),
     ),
-    "3.3": (Reason(_COUNTS, (), ("accessible", "attainable")), Reason(_SHARES, (), ("proportion",))),
-    "3.4": (Reason(_SHARES),),
+    "3.3": (Reason(_COUNTS, (), ("accessible", "attainable")), Reason(_PROPORTIONS, (), ("proportion",))),
+    "3.4": (Reason(_PROPORTIONS),),
     "4.1": (Reason("misprint: the two imaginary solutions are printed with the sign of p exchanged"),),
     "4.2": (
         Reason("-1.752 follows from the printed T and p, of three decimals", (), (), "exact"),

@@ -1,4 +1,4 @@
-"""Table 3.4 of the thesis: smallest part of the accessible orientations of a place that is attained, in an annulus."""
+"""Table 3.4 of the thesis: smallest part of the accessible orientations of a position that is attained."""
 
 import itertools
 import math
@@ -17,7 +17,7 @@ from cspr_jax.published.chapter_3 import (
     accessible_there,
     attained_there,
     checker_of,
-    sizes,
+    orientation_counts,
     variant,
 )
 from cspr_jax.robots.statics.symmetries import folded, symmetries
@@ -34,7 +34,7 @@ def smallest_proportions(
     annuli: Sequence[Sets],
     values: int = attainable.VALUES,
 ) -> list[float]:
-    """Smallest part of the orientations of a place that horizontal transitions attain, in each of many annuli.
+    """Smallest part of the orientations of a position that horizontal transitions attain, in each of many annuli.
 
     Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
     """
@@ -42,21 +42,21 @@ def smallest_proportions(
     sets = [one for annulus in annuli for one in annulus]
     owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)
-    shares = np.array([mask.mean() for mask in good])
+    proportions = np.array([mask.mean() for mask in good])
     smallest = np.ones(len(annuli))
-    # All values are tried at the place of each annulus with the smallest share so far; then, round by round, where less
-    # is attained than there. All annuli go together, so that no process waits for the end of one.
-    all_sets, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
+    # All values are tried at the position of each annulus with the smallest proportion so far; then, round by round,
+    # where less is attained than there. All annuli go together, so that no process waits for the end of one.
+    all_sets, rising = np.arange(len(sets)), np.argsort(proportions, kind="stable")
     only = rising[np.unique(owner[rising], return_index=True)[1]]
     for candidates, tried in ((only, likely), (only, rest), (all_sets, likely), (all_sets, rest)):
-        left = candidates[shares[candidates] < smallest[owner[candidates]]].tolist()
+        left = candidates[proportions[candidates] < smallest[owner[candidates]]].tolist()
         if left:
             masks = attained([(sets[k][0], sets[k][1][~good[k]]) for k in left], tried)
             for k, mask in zip(left, masks, strict=True):
                 good[k][~good[k]] = mask
-                shares[k] = good[k].mean()
+                proportions[k] = good[k].mean()
         if tried is rest:
-            np.minimum.at(smallest, owner[candidates], shares[candidates])
+            np.minimum.at(smallest, owner[candidates], proportions[candidates])
     return smallest.tolist()
 
 
@@ -68,21 +68,23 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
         for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
 
             def attained(sets: Sets, tried: np.ndarray, amplitude: str = amplitude) -> list[np.ndarray]:
-                return spread(partial(attained_there, amplitude, choice, tried), sets, sizes(sets))
+                return spread(partial(attained_there, amplitude, choice, tried), sets, orientation_counts(sets))
 
             with within(f"{amplitude}, {definition}"):
-                requests = [[(place, divisions) for place in _places(amplitude, depth)] for depth in _DEPTHS]
-                places = list(itertools.chain(*requests))
-                inside = iter(spread(partial(accessible_there, amplitude, definition), places, [1] * len(places)))
-                annuli = [[(place, next(inside).angles) for place, _ in annulus] for annulus in requests]
+                requests = [
+                    [(position, divisions) for position in _annulus_positions(amplitude, depth)] for depth in _DEPTHS
+                ]
+                positions = list(itertools.chain(*requests))
+                inside = iter(spread(partial(accessible_there, amplitude, definition), positions, [1] * len(positions)))
+                annuli = [[(position, next(inside).angles) for position, _ in annulus] for annulus in requests]
                 smallest = smallest_proportions(attained, annuli, choice.values)
             for depth, part in zip(_DEPTHS, smallest, strict=True):
                 cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * part
     return cells
 
 
-def _places(amplitude: str, depth: float) -> list[np.ndarray]:
-    # Return the places of the annulus, but one only of those that symmetries of the robot map onto each other.
+def _annulus_positions(amplitude: str, depth: float) -> list[np.ndarray]:
+    # Return the positions of the annulus, but one only of those that symmetries of the robot map onto each other.
     robot = checker_of(amplitude).problem.robot
     azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
     return [

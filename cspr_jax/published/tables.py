@@ -1,9 +1,19 @@
 """Published tables beside the same cells computed. The published numbers are compared with, never computed with."""
 
+import contextlib
 import dataclasses
+import hashlib
+import json
+import os
+import sys
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
+
+import jax
+import jaxlib.version
+import numpy as np
 
 from cspr_jax.errors import ConfigError, demand, shown
 from cspr_jax.errors.suggestions import one_of
@@ -13,12 +23,17 @@ from cspr_jax.published import batotp, boralugoda, chapter_1, chapter_3, peers, 
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import TableSettings
 from cspr_jax.published.reasons import READINGS, reason_of
-from cspr_jax.runtime.kept_results import kept_result
+from cspr_jax.runtime.compile_cache import PROGRAMS, plain_bytes
+from cspr_jax.runtime.packed import inflated
+from cspr_jax.runtime.persistent_jit import checksum_of_sources
 from cspr_jax.runtime.stages import within
 
 SCHEMA = 1
 # As in plans and sweeps.
 LARGEST_ARCS, LARGEST_VALUES = 1000, 100
+# Files of the package that decide what it computes.
+_SOURCES = (".py", ".toml", ".csv")
+LARGEST_RESULT = 1 << 24  # bytes, not compressed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,6 +174,30 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
     ]
 
 
+def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
+    """A result of the same sources, libraries and settings: that of an earlier run, else one that is kept from now.
+
+    It lies beside compiled code, whose entries bear checksums: a damaged one is removed before it is read here.
+    """
+    folder = os.environ.get(PROGRAMS)
+    if not folder:
+        return compute()
+    versions = [jax.__version__, jaxlib.version.__version__, np.__version__, sys.version, jax.default_backend()]
+    key = json.dumps([name, settings, versions, os.environ.get("XLA_FLAGS", ""), checksum_of_sources(_SOURCES)])
+    path = Path(folder) / f"{name}-{hashlib.sha256(key.encode()).hexdigest()}"
+    if not again:
+        with contextlib.suppress(OSError, ValueError, TypeError, RecursionError):
+            kept_key, result = json.loads(inflated(plain_bytes(path), LARGEST_RESULT))
+            if kept_key == key:
+                return result
+    result = compute()
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    with contextlib.suppress(OSError):
+        partial.write_bytes(zlib.compress(json.dumps([key, result]).encode()))
+        partial.replace(path)  # it may be a link to the entry of a former run
+    return result
+
+
 def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
     """The object that `cspr table --json` prints."""
     return {"schema": SCHEMA, "table": name, "cells": [_plain(cell) for cell in cells]}
@@ -200,10 +239,10 @@ def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     usual = TableSettings()
 
     def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value, known = options[option], tuple(names)
-        if value not in (None, "all", *known):
-            raise ConfigError(option, f"{shown(value)}: {demand(one_of(value, known))}, all")
-        return otherwise if value is None else known if value == "all" else (value,)
+        value, allowed = options[option], tuple(names)
+        if value not in (None, "all", *allowed):
+            raise ConfigError(option, f"{shown(value)}: {demand(one_of(value, allowed))}, all")
+        return otherwise if value is None else allowed if value == "all" else (value,)
 
     return TableSettings(
         values_of("--definition", chapter_3.DEFINITIONS, usual.definitions),
@@ -214,9 +253,9 @@ def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     )
 
 
-def _count(option: str, value: Any, otherwise: int, most: int) -> int:
+def _count(option: str, value: Any, otherwise: int, maximum: int) -> int:
     if value is None:
         return otherwise
-    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= most:
-        raise ConfigError(option, f"{shown(value)}: must be an integer from 1 to {most}")
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= maximum:
+        raise ConfigError(option, f"{shown(value)}: must be an integer from 1 to {maximum}")
     return value

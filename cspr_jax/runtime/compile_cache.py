@@ -38,7 +38,7 @@ FORMAT = 2
 # With a largest size, jax notes beside each entry when it was used last.
 MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
-_OWN, _MARK = "run", "~"
+_OWN, _SEPARATOR = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry for '(.*?)': ((\w+).*)", re.DOTALL)
 # Environment variable with the folder of the programs of `persistent_jit`: that of this run.
 PROGRAMS = "CSPR_PROGRAMS"
@@ -49,10 +49,10 @@ PRIVATE = 0o700
 @dataclasses.dataclass
 class _KeptEntries:
     # Entries of former runs that this one has taken: the kept file, and by what the file of this run is known again.
-    whole: Path
+    entries: Path
     folder: Path
     process: int
-    taken: dict[str, tuple[Path, tuple[int, int]]] = dataclasses.field(default_factory=dict)
+    origins: dict[str, tuple[Path, tuple[int, int]]] = dataclasses.field(default_factory=dict)
     unusable: set[str] = dataclasses.field(default_factory=set)
 
 
@@ -96,13 +96,13 @@ def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
         raise OSError(errno.EPERM, f"others may write into {folder}, and their code would be executed: chmod go-w")
 
 
-def plain_bytes(path: Path, most: int = LARGEST_ENTRY) -> bytes:
+def plain_bytes(path: Path, maximum: int = LARGEST_ENTRY) -> bytes:
     """Content of a plain file; nothing that lies in its place, such as a pipe, holds up the reader."""
     flags = (getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     descriptor = os.open(path, os.O_RDONLY | sum(flags))
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode) or status.st_size > most:
+        if not stat.S_ISREG(status.st_mode) or status.st_size > maximum:
             raise OSError(errno.EINVAL, "no plain file of a usual size")
         return file.read()
 
@@ -121,8 +121,8 @@ def largest_size() -> int:
 def _take(run: _KeptEntries) -> int:
     # Bring entries into the folder of this run; return the number of damaged ones, which are removed.
     damaged, is_bounded = 0, largest_size() >= 0
-    for entry in run.whole.iterdir():
-        name, _, checksum = entry.name.rpartition(_MARK)
+    for entry in run.entries.iterdir():
+        name, _, checksum = entry.name.rpartition(_SEPARATOR)
         try:
             data = plain_bytes(entry)
         except FileNotFoundError:  # another run has taken it away
@@ -135,21 +135,21 @@ def _take(run: _KeptEntries) -> int:
                 damaged += 1
             else:
                 target = run.folder / name
-                _place(entry, data, target)
-                run.taken[name] = entry, _mark_of(target)
+                _link_or_copy(entry, data, target)
+                run.origins[name] = entry, _identity_of(target)
                 if is_bounded and name.endswith(_ENTRY):
                     used = run.folder / f"{name.removesuffix(_ENTRY)}{_USED}"
                     used.write_bytes(entry.stat().st_mtime_ns.to_bytes(8, "little"))
     return damaged
 
 
-def _mark_of(path: Path) -> tuple[int, int]:
+def _identity_of(path: Path) -> tuple[int, int]:
     # It differs once another file has been put in its place.
     status = path.lstat()
     return status.st_ino, status.st_mtime_ns
 
 
-def _place(entry: Path, data: bytes, target: Path) -> None:
+def _link_or_copy(entry: Path, data: bytes, target: Path) -> None:
     try:
         os.link(entry, target)
     except OSError:  # no links on this disk, or too many to one file
@@ -175,13 +175,13 @@ def set_aside(beginning: str) -> int:
     """Forget kept entries that cannot be used: what is compiled now takes their place."""
     count = 0
     for run in _pending:
-        names = {name for name in run.taken if name.startswith(beginning)} - run.unusable
+        names = {name for name in run.origins if name.startswith(beginning)} - run.unusable
         run.unusable |= names
         count += len(names)
         for name in names:
             target = run.folder / name
             with contextlib.suppress(OSError):
-                if _mark_of(target) == run.taken[name][1]:  # jax, too, leaves alone what is there
+                if _identity_of(target) == run.origins[name][1]:  # jax, too, leaves alone what is there
                     target.unlink()
     return count
 
@@ -223,14 +223,14 @@ def _write_no_more() -> None:
 
 def _hand_over(run: _KeptEntries) -> None:
     for name in run.unusable:
-        run.taken.pop(name)[0].unlink(missing_ok=True)
-    names = {entry.name.rpartition(_MARK)[0] for entry in run.whole.iterdir()}
+        run.origins.pop(name)[0].unlink(missing_ok=True)
+    names = {entry.name.rpartition(_SEPARATOR)[0] for entry in run.entries.iterdir()}
     for entry in run.folder.iterdir():
         if entry.name.endswith(_USED) or entry.name.startswith("."):  # jax's times, and its lock
             continue
         with contextlib.suppress(OSError):
-            before, mark = run.taken.get(entry.name, (None, None))
-            if entry.name in names and (before is None or _mark_of(entry) == mark):
+            before, identity = run.origins.get(entry.name, (None, None))
+            if entry.name in names and (before is None or _identity_of(entry) == identity):
                 continue
             data = plain_bytes(entry)
             if is_whole(data):
@@ -240,21 +240,21 @@ def _hand_over(run: _KeptEntries) -> None:
                 data = data.removesuffix(ending) + ending
                 ended = entry.with_name(f".{entry.name}")
                 ended.write_bytes(data)
-                ended.replace(run.whole / f"{entry.name}{_MARK}{checksum_of(entry.name, data)}")
-    _trim(run.whole)
+                ended.replace(run.entries / f"{entry.name}{_SEPARATOR}{checksum_of(entry.name, data)}")
+    _trim(run.entries)
 
 
-def _trim(whole: Path) -> None:
+def _trim(entries: Path) -> None:
     # Other runs may do the same.
     sizes = {}
-    for entry in whole.iterdir():
+    for entry in entries.iterdir():
         with contextlib.suppress(FileNotFoundError):
             status = entry.lstat()
             sizes[entry] = status.st_mtime, status.st_size
-    maximum, size = largest_size(), 0
+    maximum, total = largest_size(), 0
     for i, entry in enumerate(sorted(sizes, key=lambda entry: sizes[entry], reverse=True)):
-        size += sizes[entry][1]
-        if i >= LARGEST or 0 <= maximum < size:
+        total += sizes[entry][1]
+        if i >= LARGEST or 0 <= maximum < total:
             entry.unlink(missing_ok=True)
 
 
@@ -271,10 +271,10 @@ def checksum_of(name: str, data: bytes) -> str:
 
 def _remove_leftovers(folder: Path) -> None:
     # Runs of this machine that were killed have left these folders behind.
-    for place in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
-        process = place.name.rpartition("-")[2]
+    for run_folder in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
+        process = run_folder.name.rpartition("-")[2]
         if process.isdigit() and _is_gone(int(process)):
-            shutil.rmtree(place, ignore_errors=True)
+            shutil.rmtree(run_folder, ignore_errors=True)
 
 
 def _is_gone(process: int) -> bool:

@@ -10,6 +10,6 @@ QUICK = (
 )
 
 
-def least() -> dict[str, int] | None:
+def proof_options() -> dict[str, int] | None:
     """Options of jax.jit for kernels of proofs, a third of that time: a motion takes few blocks."""
     return {"xla_backend_optimization_level": 0} if QUICK[0] in os.environ.get("XLA_FLAGS", "") else None

@@ -9,11 +9,11 @@ _DENSEST = 1032
 _STEP, _ZSTD = 1 << 20, b"\x28\xb5\x2f\xfd"
 
 
-def inflated(data: bytes, most: int) -> bytes:
+def inflated(data: bytes, maximum: int) -> bytes:
     """Content of what zlib has packed, if it is all there and no larger than it may be."""
     reader = zlib.decompressobj()
     try:
-        content = reader.decompress(data, most)
+        content = reader.decompress(data, maximum)
     except zlib.error as error:
         raise ValueError(str(error)) from error
     if not reader.eof:
@@ -32,16 +32,16 @@ def is_whole(data: bytes) -> bool:
 
 
 def _is_whole_zlib(data: bytes) -> bool:
-    reader, size = zlib.decompressobj(), 0
+    reader, length = zlib.decompressobj(), 0
     try:
-        while not reader.eof and size <= LARGEST_CODE:
+        while not reader.eof and length <= LARGEST_CODE:
             part = reader.decompress(data, _STEP)
-            data, size = reader.unconsumed_tail, size + len(part)
+            data, length = reader.unconsumed_tail, length + len(part)
             if not part and not data:
                 break
     except zlib.error:
         return False
-    return reader.eof and size <= LARGEST_CODE
+    return reader.eof and length <= LARGEST_CODE
 
 
 def _is_whole_zstd(zstd, data: bytes) -> bool:
@@ -59,11 +59,11 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
 def is_too_large(data: bytes) -> bool:
     """Tell whether packed code holds more than it may: jax would inflate it at one go."""
     if data.startswith(_ZSTD):
-        return _size_of_zstd(data) > LARGEST_CODE
+        return _zstd_length(data) > LARGEST_CODE
     return len(data) > LARGEST_CODE // _DENSEST and not is_whole(data)
 
 
-def _size_of_zstd(data: bytes) -> int:
+def _zstd_length(data: bytes) -> int:
     # The head of a frame says the size of its content (RFC 8878, 3.1.1.1), or not: 0.
     head = data[len(_ZSTD)] if len(data) > len(_ZSTD) else 0
     is_single, width = head >> 5 & 1, (head >> 5 & 1, 2, 4, 8)[head >> 6]

@@ -42,7 +42,7 @@ _SETTINGS = (
     "jax_default_matmul_precision",
 )
 # The place of compiled code says nothing of programs; the folder of a run has another name each time.
-_APART = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
+_IRRELEVANT = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
 # A program that cannot be written, read or called; then jax traces the function, as ever.
 _TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
 _UNREADABLE = (*_TROUBLE, struct.error)
@@ -99,7 +99,7 @@ class _Programs:
         bound = self._signature.bind(*arguments, **keywords).arguments
         static = {name: bound.pop(name) for name in self._static if name in bound}
         leaves, tree = jax.tree.flatten(bound)
-        shapes = tuple([_shape(leaf) for leaf in leaves])
+        shapes = tuple([_shape(array) for array in leaves])
         typed = tuple([(name, type(value), value) for name, value in static.items()])
         key = (tree, shapes, typed, tuple([getattr(jax.config, name) for name in _SETTINGS]))
         make = functools.partial(self._made, leaves, tree, shapes, static)
@@ -135,16 +135,16 @@ class _Programs:
             return None
         try:
             words = [_name(self._function), described(static), described_tree(tree), _written(shapes), _settings()]
-            key = json.dumps([_FORMAT, *_versions(), _sources(), *words])
+            key = json.dumps([_FORMAT, *_versions(), checksum_of_sources(), *words])
             path = Path(os.environ[PROGRAMS]) / f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()}"
-            stored = None if is_anew else _read(path, key)
-            if stored is not None:
+            program = None if is_anew else _read(path, key)
+            if program is not None:
                 with contextlib.suppress(*_UNREADABLE):
-                    return _Program(*self._compiled(*stored), path.name)
-            stored = self._lowered(leaves, tree, static)
+                    return _Program(*self._compiled(*program), path.name)
+            program = self._lowered(leaves, tree, static)
             with contextlib.suppress(OSError):
-                _write(path, key, *stored)
-            return _Program(*self._compiled(*stored), None)
+                _write(path, key, *program)
+            return _Program(*self._compiled(*program), None)
         except _UNREADABLE:
             return None
 
@@ -186,14 +186,14 @@ def _name(function: Callable) -> str:
     return name
 
 
-def _shape(leaf: Any) -> tuple:
-    if isinstance(leaf, np.ndarray | np.generic):
-        return leaf.shape, leaf.dtype
-    if isinstance(leaf, jax.Array) and not isinstance(leaf, jax.core.Tracer):
-        return leaf.shape, leaf.dtype, leaf.weak_type
-    if type(leaf) in _SCALARS:
-        return (type(leaf),)
-    raise Undescribed(type(leaf).__name__)
+def _shape(array: Any) -> tuple:
+    if isinstance(array, np.ndarray | np.generic):
+        return array.shape, array.dtype
+    if isinstance(array, jax.Array) and not isinstance(array, jax.core.Tracer):
+        return array.shape, array.dtype, array.weak_type
+    if type(array) in _SCALARS:
+        return (type(array),)
+    raise Undescribed(type(array).__name__)
 
 
 def _written(shapes: tuple) -> list:
@@ -202,7 +202,9 @@ def _written(shapes: tuple) -> list:
 
 def _settings() -> list[str]:
     # All settings of the process, whatever they mean, and those of this thread.
-    of_process = [f"{name}={value}" for name, value in sorted(jax.config.values.items()) if not name.startswith(_APART)]
+    of_process = [
+        f"{name}={value}" for name, value in sorted(jax.config.values.items()) if not name.startswith(_IRRELEVANT)
+    ]
     return [*of_process, *(f"{name}={getattr(jax.config, name)}" for name in _SETTINGS)]
 
 
@@ -211,10 +213,10 @@ def _versions() -> tuple[str, ...]:
 
 
 @functools.cache
-def _sources() -> str:
-    # All of them, since any may be traced; times of files say too little, and reading them takes 15 ms.
+def checksum_of_sources(endings: tuple[str, ...] = (".py",)) -> str:
+    """Checksum of all files of the package that end so: times say too little, and reading them takes 15 ms."""
     package, total = Path(__file__).parents[1], hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted(path for path in package.rglob("*") if path.suffix in endings):
         content = path.read_bytes()
         total.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
     return total.hexdigest()

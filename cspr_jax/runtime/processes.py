@@ -18,11 +18,11 @@ from typing import Any
 
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.cores import VARIABLE, cores
-from cspr_jax.runtime.surroundings import check_threads_of_jax
+from cspr_jax.runtime.process_environment import check_threads
 
 SAFE_PATH = "PYTHONSAFEPATH"
 # Most workers; and most where the user does not say how many, since each takes a GB.
-LARGEST, MOST = 256, 8
+LARGEST, LARGEST_USUAL = 256, 8
 GROUPS = 6  # for each worker: the first one that is done takes another
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
@@ -38,7 +38,7 @@ def usual_count(parts: int) -> int:
     """Number of processes for work that gains by them, where the user gives none."""
     import jax
 
-    return max(1, min(cores(), MOST, parts)) if jax.default_backend() == "cpu" else 1
+    return max(1, min(cores(), LARGEST_USUAL, parts)) if jax.default_backend() == "cpu" else 1
 
 
 class Workers:
@@ -57,7 +57,7 @@ class Workers:
 
     def __init__(self, count: int, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
         """Start nothing yet."""
-        check_threads_of_jax(count)
+        check_threads(count)
         # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
         if _NO_COMPLAINT not in sys.warnoptions:
             sys.warnoptions.append(_NO_COMPLAINT)
@@ -111,11 +111,11 @@ class Spread:
                 self._workers.kill()
             self._workers.close()
 
-    def __call__(self, function: Callable[[list], list], items: Sequence, sizes: Sequence[float]) -> list:
+    def __call__(self, function: Callable[[list], list], items: Sequence, costs: Sequence[float]) -> list:
         """Results of a function, in order."""
         if self._workers is None:
             return function(list(items))
-        groups = balanced(sizes, GROUPS * self._count)
+        groups = balanced(costs, GROUPS * self._count)
         try:
             futures = [self._workers.submit(function, [items[k] for k in group]) for group in groups]
             results = {
@@ -128,15 +128,15 @@ class Spread:
         return [results[k] for k in range(len(items))]
 
 
-def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
+def balanced(costs: Sequence[float], count: int) -> list[list[int]]:
     """Groups of items that take nearly equally long."""
-    groups: list[list[int]] = [[] for _ in range(min(count, len(sizes)))]
-    full = [0.0] * len(groups)
-    for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
-        minimum = min(range(len(groups)), key=lambda g: (full[g], len(groups[g])))
-        groups[minimum].append(k)
-        full[minimum] += sizes[k]
-    return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -full[k])]
+    groups: list[list[int]] = [[] for _ in range(min(count, len(costs)))]
+    totals = [0.0] * len(groups)
+    for k in sorted(range(len(costs)), key=lambda k: -costs[k]):
+        smallest = min(range(len(groups)), key=lambda g: (totals[g], len(groups[g])))
+        groups[smallest].append(k)
+        totals[smallest] += costs[k]
+    return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -totals[k])]
 
 
 def _start(parent: int, begin: Callable[..., None] | None, arguments: tuple) -> None:

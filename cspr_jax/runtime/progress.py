@@ -14,7 +14,7 @@ from cspr_jax.runtime import stages
 LINE_SECONDS = 60.0
 
 
-class Pace:
+class RateEstimate:
     """Rate of a sweep, and the time that it will still take.
 
     Args:
@@ -34,17 +34,17 @@ class Pace:
 
     def advance(self, done: int, total: int) -> None:
         """Take note of a finished tile; the first call says how many cells an earlier run has left."""
-        instant = self._clock()
+        seconds = self._clock()
         self._tiles += 1
         if self._tiles == 0:
-            self._begin = (done, instant)
+            self._begin = (done, seconds)
             return
         if self._tiles == 1:
-            self._first = (done, instant)
+            self._first = (done, seconds)
         # The first tile holds the time of compiling: once there are others, they are counted alone.
         cells, since = self._begin if self._tiles == 1 else self._first
-        self.rate = (done - cells) / max(instant - since, 1e-9)
-        self.ends = instant + (total - done) / self.rate if self.rate > 0.0 else None
+        self.rate = (done - cells) / max(seconds - since, 1e-9)
+        self.ends = seconds + (total - done) / self.rate if self.rate > 0.0 else None
 
     def left(self) -> str:
         """Time that is left, in words."""
@@ -67,15 +67,17 @@ def progress() -> Iterator[Callable[[int, int], None]]:
 
         def render(self, task):
             """The text of this moment; see `rich.progress.TextColumn`."""
-            self.text_format = task.description if pace.rate is None else f"{pace.rate:,.0f} cells/s  {pace.left()}"
+            self.text_format = (
+                task.description if estimate.rate is None else f"{estimate.rate:,.0f} cells/s  {estimate.left()}"
+            )
             return super().render(task)
 
-    pace = Pace()
+    estimate = RateEstimate()
     with _bar(BarColumn(), TaskProgressColumn(), Words("", markup=False)) as bar:
         task = bar.add_task("starting", total=None)
 
         def on_tile(done: int, total: int) -> None:
-            pace.advance(done, total)
+            estimate.advance(done, total)
             bar.update(task, completed=done, total=total)
 
         with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
@@ -84,15 +86,15 @@ def progress() -> Iterator[Callable[[int, int], None]]:
 
 @contextlib.contextmanager
 def _lines() -> Iterator[Callable[[int, int], None]]:
-    pace, cells = Pace(), [(0, 0)]
+    estimate, cells = RateEstimate(), [(0, 0)]
 
     def on_tile(done: int, total: int) -> None:
-        pace.advance(done, total)
+        estimate.advance(done, total)
         cells.append((done, total))
 
     def line() -> str:
         done, total = cells[-1]
-        rate = "" if pace.rate is None else f", {pace.rate:,.3g} cells/s, {pace.left()}"
+        rate = "" if estimate.rate is None else f", {estimate.rate:,.3g} cells/s, {estimate.left()}"
         fraction = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
         return f"{fraction}{rate}"
 

@@ -27,7 +27,7 @@ from cspr_jax.runtime import compile_cache, stages
 from cspr_jax.runtime.compile_options import QUICK
 
 # Twice as fast where the processor has such vectors; XLA chooses half their width by itself.
-WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
+WIDE, WIDE_FEATURE = "--xla_cpu_prefer_vector_width=512", "avx512f"
 PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
 # glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
 # arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
@@ -93,12 +93,12 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
     Returns:
         the folder of this process; None if jax has a cache already, CSPR_CACHE_DIR is empty, or nothing can be written.
     """
-    place = _folder(folder, _warn_of_python)
+    shared = _folder(folder, _warn_of_python)
     loaded = sys.modules.get("jax")
-    if place is None or CACHE in os.environ or (loaded is not None and loaded.config.jax_compilation_cache_dir):
+    if shared is None or CACHE in os.environ or (loaded is not None and loaded.config.jax_compilation_cache_dir):
         return None
     before = set(os.environ)
-    run_folder = _keep(place, _warn_of_python)
+    run_folder = _keep(shared, _warn_of_python)
     if run_folder is not None and loaded is not None:
         # It has read the environment when it was imported.
         for name in {CACHE, *_KEPT} - before:
@@ -190,9 +190,9 @@ def _folder(setting: str | Path | None, warn: Callable[[str], None]) -> Path | N
     folder = shared / hashlib.sha256(repr(current).encode()).hexdigest()[:16]
     try:
         shared.parent.mkdir(parents=True, exist_ok=True)
-        for place in (shared, folder):
-            place.mkdir(mode=compile_cache.PRIVATE, exist_ok=True)
-            compile_cache.check_owner(place, may_be_shared=place is shared)
+        for path in (shared, folder):
+            path.mkdir(mode=compile_cache.PRIVATE, exist_ok=True)
+            compile_cache.check_owner(path, may_be_shared=path is shared)
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, "nothing can be written there")
     except OSError as error:
@@ -225,29 +225,29 @@ def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
         return settings
     # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since all of the words
     # are part of the key of compiled code.
-    ours = [WIDE] if NEEDS in _processor() else []
+    ours = [WIDE] if WIDE_FEATURE in _processor() else []
     named = [word.partition("=")[0] for word in settings.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]
-    return " ".join([*known_flags(folder, ours), settings]).strip()
+    return " ".join([*accepted_flags(folder, ours), settings]).strip()
 
 
-def known_flags(folder: Path, flags: Sequence[str]) -> list[str]:
+def accepted_flags(folder: Path, flags: Sequence[str]) -> list[str]:
     """Flags that this XLA knows, of some: it ends a process whose XLA_FLAGS name another one."""
     refusal = _refusal(folder, " ".join(flags)) if flags else ""
     if refusal is None:  # there was no answer
         return []
-    return [flag for flag in flags if not refusal or _is_known(folder, flag)]
+    return [flag for flag in flags if not refusal or _is_accepted(folder, flag)]
 
 
 def _check_flags(folder: Path | None, flags: str) -> None:
     # In a file they may change from one time to the next.
-    place = folder if flags.lstrip().startswith("-") else None
-    reason = _refusal(place, flags)
+    record_folder = folder if flags.lstrip().startswith("-") else None
+    reason = _refusal(record_folder, flags)
     if reason:
         raise ConfigError("XLA_FLAGS", f"{shown(flags)}: must be flags that this XLA knows: {reason}")
 
 
-def _is_known(folder: Path, flags: str) -> bool:
+def _is_accepted(folder: Path, flags: str) -> bool:
     return _refusal(folder, flags) == ""
 
 
@@ -256,14 +256,14 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
     # where there was no answer.
     record = None if folder is None else folder / "flags.json"
     try:
-        known = {} if record is None else json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
+        answers = {} if record is None else json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
     except (OSError, ValueError, RecursionError):
-        known = {}
-    known = known if isinstance(known, dict) else {}
-    if known.get(flags) is True:
+        answers = {}
+    answers = answers if isinstance(answers, dict) else {}
+    if answers.get(flags) is True:
         return ""
-    if isinstance(known.get(flags), str) and known[flags]:
-        return known[flags]
+    if isinstance(answers.get(flags), str) and answers[flags]:
+        return answers[flags]
     settings = os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "2"}
     # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
     words, silent, pipe = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL, subprocess.PIPE
@@ -281,7 +281,7 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
         try:
             partial.unlink(missing_ok=True)
             with partial.open("x", encoding="utf-8") as file:
-                file.write(json.dumps(known | {flags: reason or True}))
+                file.write(json.dumps(answers | {flags: reason or True}))
             partial.replace(record)
         except OSError:
             return None

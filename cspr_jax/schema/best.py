@@ -29,45 +29,49 @@ _INSIDE, _OUTSIDE = CELL_SIDES.index("inside"), CELL_SIDES.index("outside")
 
 
 class Best(NamedTuple):
-    """Arrays reduced over one of their axes, and the places of the best points in it.
+    """Arrays reduced over one of their axes, and the indices of the best points in it.
 
     Fields:
         data: by name; that of `schema.quantities.best_name` is the best point itself, NaN where no point will do.
-        places: (...) of the best point in the axis, of the best candidate where none will do.
+        indices: (...) of the best point in the axis, of the best candidate where none will do.
     """
 
     data: dict[str, np.ndarray]
-    places: np.ndarray
+    indices: np.ndarray
 
 
-def check_axis(axis: str, known: Sequence[str]) -> None:
+def check_axis(axis: str, names: Sequence[str]) -> None:
     """Refuse an axis of which no best point can be chosen."""
-    allowed = [name for name in known if name not in AXES or best_name(name) in BEST]
+    allowed = [name for name in names if name not in AXES or best_name(name) in BEST]
     if axis not in allowed:
         raise InputError("--best", axis, f"one of {', '.join(allowed)}" if allowed else "absent: there is no such axis")
 
 
 def best_of(
-    data: Mapping[str, np.ndarray], name: str, points: Float[np.ndarray, "n"], place: int, pictured: Sequence[str] = ()
+    data: Mapping[str, np.ndarray],
+    name: str,
+    points: Float[np.ndarray, "n"],
+    dimension: int,
+    pictured: Sequence[str] = (),
 ) -> Best:
     """Reduce arrays over one of their axes."""
     order = ranked(data, pictured)
     verdict = data.get("verdict")
     if not order and verdict is None:
         raise InputError("--best", name, "absent: no stored quantity says which cell is better")
-    keys = [] if verdict is None else [_unfitness(verdict)]
-    keys += [_badness(quantity, data[quantity]) for quantity in order]
-    places = np.asarray(np.take(np.lexsort(keys[::-1], axis=place), 0, axis=place))
-    reduced = {quantity: _taken(values, places, place) for quantity, values in data.items()}
+    sort_keys = [] if verdict is None else [_unfitness(verdict)]
+    sort_keys += [_badness(quantity, data[quantity]) for quantity in order]
+    indices = np.asarray(np.take(np.lexsort(sort_keys[::-1], axis=dimension), 0, axis=dimension))
+    reduced = {quantity: _selected(values, indices, dimension) for quantity, values in data.items()}
     if verdict is not None:
         will_do = _unfitness(reduced["verdict"]) == 0
-        reduced["verdict"] = _with_doubt(reduced, verdict, will_do, place)
+        reduced["verdict"] = _with_doubt(reduced, verdict, will_do, dimension)
     else:
         will_do = np.isfinite(_badness(order[0], reduced[order[0]]))
     if "cell_side" in data:
-        reduced["cell_side"] = _side(data["cell_side"], place)
-    chosen = np.where(will_do, np.asarray(points, float)[places], np.nan)
-    return Best({best_name(name): chosen} | reduced, places)
+        reduced["cell_side"] = _side(data["cell_side"], dimension)
+    chosen = np.where(will_do, np.asarray(points, float)[indices], np.nan)
+    return Best({best_name(name): chosen} | reduced, indices)
 
 
 def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> list[str]:
@@ -91,23 +95,23 @@ def _badness(name: str, values: np.ndarray) -> np.ndarray:
     return np.where(is_none, np.inf, worse)
 
 
-def _taken(values: np.ndarray, places: np.ndarray, place: int) -> np.ndarray:
-    where = np.expand_dims(places, place)
+def _selected(values: np.ndarray, indices: np.ndarray, dimension: int) -> np.ndarray:
+    where = np.expand_dims(indices, dimension)
     where = where.reshape(*where.shape, *[1] * (values.ndim - where.ndim))
-    return np.take_along_axis(values, where, axis=place).squeeze(place)
+    return np.take_along_axis(values, where, axis=dimension).squeeze(dimension)
 
 
-def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np.ndarray, place: int) -> np.ndarray:
+def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np.ndarray, dimension: int) -> np.ndarray:
     # An undecided point may be feasible with fewer arcs than the best of the feasible points.
     count = next((reduced[name] for name in COUNTS if name in reduced), None)
     if count is None:
         return reduced["verdict"]
-    doubtful = will_do & (count > 1) & ((verdict.astype(np.int64) & _DOUBT) != 0).any(place)
+    doubtful = will_do & (count > 1) & ((verdict.astype(np.int64) & _DOUBT) != 0).any(dimension)
     fewer = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0).astype(FLAGS)
     return reduced["verdict"] | fewer
 
 
-def _side(sides: np.ndarray, place: int) -> np.ndarray:
+def _side(sides: np.ndarray, dimension: int) -> np.ndarray:
     # A whole cell is inside where it is for some point, and outside where it is for every one.
-    is_inside, is_outside = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
+    is_inside, is_outside = (sides == _INSIDE).any(dimension), (sides == _OUTSIDE).all(dimension)
     return np.where(is_inside, _INSIDE, np.where(is_outside, _OUTSIDE, 0)).astype(sides.dtype)

@@ -24,9 +24,9 @@ def identity(settings: dict[str, Any]) -> str:
     return digest({"format": FORMAT_VERSION, **settings})
 
 
-def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
+def differences(current: dict[str, Any], other: dict[str, Any]) -> list[str]:
     """Differences between two sets of settings, one phrase a key."""
-    values, before = _flat(here), _flat(there)
+    values, before = _flat(current), _flat(other)
     return [
         f"{key} = {shown(values.get(key))} here, {shown(before.get(key))} there"
         for key in sorted(before.keys() | values.keys())

@@ -18,21 +18,21 @@ class Uncertain:
     Fields:
         name: key in files, and field of `robots.model.limits.Uncertainty`.
         unit: of its values.
-        least: smallest value, of a robot without this uncertainty.
+        smallest: value, of a robot without this uncertainty.
         largest: largest value.
         description: for the reference.
     """
 
     name: str
     unit: str
-    least: float
+    smallest: float
     largest: float
     description: str
 
     @property
     def allowed(self) -> str:
         """Allowed values, in words."""
-        return f"a number from {self.least:g} to {self.largest:g}"
+        return f"a number from {self.smallest:g} to {self.largest:g}"
 
 
 UNCERTAINTIES = (
@@ -75,7 +75,7 @@ class Limit:
 
     @property
     def is_height(self) -> bool:
-        """Tell whether it is a height, of any sign, and not the size of something."""
+        """Tell whether it is a height, of any sign, and not a length or a rate."""
         return self.quantity == "depth"
 
     @property

@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
-from cspr_jax.schema import workspace_columns as of_workspaces
 from cspr_jax.schema.families import ANY_PATTERN
 from cspr_jax.schema.plugins import ExtensibleRows
 from cspr_jax.schema.quantities import (
@@ -122,7 +121,7 @@ class MapKind:
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
-_ROWS: dict[str, MapKind] = {
+_KINDS: dict[str, MapKind] = {
     kind.name: kind
     for kind in (
         MapKind(
@@ -193,10 +192,10 @@ _ROWS: dict[str, MapKind] = {
             needs=("axes.z0",),
             takes=(
                 *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
-                *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
+                *("limits", "limits.uncertainty", *columns.OBSTACLE_KEYS),
             ),
-            stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
-            only_with=((("clearance",), columns.SURROUNDINGS),),
+            stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.OBSTACLE_KEYS)),
+            only_with=((("clearance",), columns.OBSTACLE_KEYS),),
             rows=(MOTION_CLEARANCE,),
         ),
         MapKind(
@@ -295,10 +294,10 @@ _ROWS: dict[str, MapKind] = {
                     start="pose",
                     takes=(
                         *("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.path"),
-                        *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
+                        *("limits", "limits.uncertainty", *columns.OBSTACLE_KEYS),
                     ),
-                    stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
-                    only_with=((("clearance",), columns.SURROUNDINGS),),
+                    stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.OBSTACLE_KEYS)),
+                    only_with=((("clearance",), columns.OBSTACLE_KEYS),),
                     rows=OF_PATHS,
                 ),
                 MapKind(
@@ -317,10 +316,10 @@ _ROWS: dict[str, MapKind] = {
                     start="pose",
                     takes=(
                         *("axes.from_x", "axes.from_y", "axes.from_z", "axes.z0"),
-                        *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
+                        *("limits", "limits.uncertainty", *columns.OBSTACLE_KEYS),
                     ),
-                    stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
-                    only_with=((("clearance",), columns.SURROUNDINGS),),
+                    stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.OBSTACLE_KEYS)),
+                    only_with=((("clearance",), columns.OBSTACLE_KEYS),),
                     rows=OF_PATHS,
                 ),
             ),
@@ -393,13 +392,13 @@ _ROWS: dict[str, MapKind] = {
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.workspaces.map:WorkspaceMap",
             cost=CellCost(seconds=2e-6, limits=0.0, uncertainty=0.0),
-            quantities=of_workspaces.QUANTITIES,
-            stored=of_workspaces.STORED,
-            stored_with=of_workspaces.STORED_WITH,
-            only_with=of_workspaces.ONLY_WITH,
+            quantities=columns.WORKSPACE_QUANTITIES,
+            stored=columns.WORKSPACES_STORED,
+            stored_with=columns.WORKSPACES_STORED_WITH,
+            only_with=columns.WORKSPACES_ONLY_WITH,
             rows=(POSE_VERDICT,),
             pictured=("wrench_margin", "closure_margin", "clearance", "verdict"),
-            motionless=of_workspaces.QUANTITIES,
+            motionless=columns.WORKSPACE_QUANTITIES,
             families=(),
             takes=("workspace", "limits", "limits.uncertainty", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
             limits=("tension_min", "tension_max", "floor", "cable_length_max", "cable_speed_max"),
@@ -407,7 +406,7 @@ _ROWS: dict[str, MapKind] = {
     )
 }
 MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
-    _ROWS, "cspr_jax.maps", lambda module: register(module.KIND, *module.QUANTITIES)
+    _KINDS, "cspr_jax.maps", lambda module: register(module.KIND, *module.QUANTITIES)
 )
 
 

@@ -62,7 +62,7 @@ def nearest_bodies(_: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 # More words than these nobody reads, nor can HDF5 keep them beside a dataset.
-MOST = 1000
+LARGEST_COUNT = 1000
 # By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
 MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
     "line-bounds": line_bounds,
@@ -78,7 +78,7 @@ def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple
     if not quantity.meanings or not settings:
         return ()
     words = MEANINGS[quantity.meanings](settings)
-    return words if len(words) <= MOST else ()
+    return words if len(words) <= LARGEST_COUNT else ()
 
 
 def value_attributes(quantity: Quantity, settings: Mapping[str, Any] | None) -> dict[str, Any]:

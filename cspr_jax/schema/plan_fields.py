@@ -20,7 +20,7 @@ _EXTREMES = {
     "acceleration_max": ("m s-2", "Largest acceleration of the mass centre."),
     "z_lowest": ("m", "z of the lowest point, of all of a platform: mass centre, attachment points, shape."),
 }
-WHOLE = {
+PLAN_OBJECT = {
     "schema": ("1", "Version of these fields."),
     "robot": ("", "Name of the robot."),
     "family": ("", "Trajectory family of the plan."),

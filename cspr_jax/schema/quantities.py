@@ -987,8 +987,8 @@ def columns_of(name: str, count: int) -> list[str]:
 
 def register(quantity: Quantity) -> None:
     """Add a quantity that maps can give, from outside of the package; a second time changes nothing."""
-    known = EVERY.get(quantity.name, quantity)
-    if known != quantity:
+    present = EVERY.get(quantity.name, quantity)
+    if present != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
     QUANTITIES[quantity.name] = quantity
 

@@ -15,7 +15,7 @@ class CellCost(NamedTuple):
 
     Fields:
         seconds: without limits, and with 30 arcs.
-        orientation: further seconds for each orientation of a place's set.
+        orientation: further seconds for each orientation of a position's set.
         limits: cost of limits, over the costs that `sweep.tile_sizes` has.
         uncertainty: cost of an uncertainty, likewise.
     """
@@ -29,13 +29,13 @@ class CellCost(NamedTuple):
 ORDINARY_COST = CellCost()
 
 
-def tile_shape(shape: tuple[int, ...], most: int = LARGEST_TILE) -> tuple[int, ...]:
+def tile_shape(shape: tuple[int, ...], maximum: int = LARGEST_TILE) -> tuple[int, ...]:
     """Shape of the tiles of a grid: whole trailing axes as long as they fit, and equal parts of the next one."""
-    tile, room = [], most
+    tile, capacity = [], maximum
     for length in reversed(shape):
-        parts = -(-length // max(room, 1))
+        parts = -(-length // max(capacity, 1))
         tile.append(-(-length // parts))
-        room //= tile[-1]
+        capacity //= tile[-1]
     return tuple(reversed(tile))
 
 
@@ -60,16 +60,16 @@ class Tiling:
         return math.prod(self.counts)
 
     def __iter__(self) -> Iterator[tuple[slice, ...]]:
-        return (self.place(index) for index in range(len(self)))
+        return (self.slices(index) for index in range(len(self)))
 
-    def place(self, index: int) -> tuple[slice, ...]:
-        """Place of a tile."""
+    def slices(self, index: int) -> tuple[slice, ...]:
+        """Slices of a tile, one for each axis."""
         corner = [int(i) * t for i, t in zip(np.unravel_index(index, self.counts), self.tile, strict=True)]
         return tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, self.tile, self.shape, strict=True))
 
     def extent(self, index: int) -> tuple[int, ...]:
         """Shape of one tile."""
-        return tuple(part.stop - part.start for part in self.place(index))
+        return tuple(part.stop - part.start for part in self.slices(index))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Grid:
         return tuple(len(points) for points in self.axes.values())
 
     @property
-    def size(self) -> int:
+    def n_cells(self) -> int:
         """Number of cells."""
         return math.prod(self.shape)
 
@@ -99,7 +99,7 @@ class Grid:
         """Its tiles."""
         return Tiling(self.shape, self.tile)
 
-    def cells(self, place: tuple[slice, ...]) -> dict[str, np.ndarray]:
+    def cells(self, slices: tuple[slice, ...]) -> dict[str, np.ndarray]:
         """Coordinates of the cells of a tile."""
-        points = [axis[part] for axis, part in zip(self.axes.values(), place, strict=True)]
+        points = [axis[part] for axis, part in zip(self.axes.values(), slices, strict=True)]
         return {name: mesh.ravel() for name, mesh in zip(self.axes, np.meshgrid(*points, indexing="ij"), strict=True)}

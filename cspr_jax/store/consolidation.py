@@ -66,17 +66,17 @@ def consolidate(
         with open_hdf5(disk, descriptor, attributes) as file:
             settings = json.loads(attributes["settings"])
             make_datasets(file, grid.axes, layout.store, dtype=layout.dtype, tile=grid.tile, settings=settings)
-            for place, shard in zip(grid.tiling, shards, strict=True):
+            for region, shard in zip(grid.tiling, shards, strict=True):
                 between()
                 for name in layout.store:
-                    file[name][place] = shard.values[name]
+                    file[name][region] = shard.values[name]
                 digests.append(shard.digest)
                 environments.add(shard.environment)
                 near_zero += shard.near_zero
                 undecided.append(shard.undecided)
             mixed = int(environments != {attributes["environment"]})
             totals = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
-            set_attributes(file, totals | _proved(undecided, grid.size))
+            set_attributes(file, totals | _proved(undecided, grid.n_cells))
             set_attributes(file, {"content_sha256": _fold(grid.axes, digests)})
         with os.fdopen(os.dup(descriptor), "rb") as again, h5py.File(again, "r") as file:
             again_digests = _digests(file, grid, layout.store, between)
@@ -86,8 +86,8 @@ def consolidate(
 
 def _proved(undecided: list[int | None], cells: int) -> dict[str, float]:
     # The part of the cells whose answer is proved, where every shard says it.
-    known = [count for count in undecided if count is not None]
-    return {"proved": 1.0 - sum(known) / cells} if len(known) == len(undecided) else {}
+    counts = [count for count in undecided if count is not None]
+    return {"proved": 1.0 - sum(counts) / cells} if len(counts) == len(undecided) else {}
 
 
 def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
@@ -96,14 +96,14 @@ def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
 
 def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[], None]) -> list[str]:
     digests = []
-    for place in grid.tiling:
+    for region in grid.tiling:
         between()
-        digests.append(digest_of({name: np.asarray(file[name][place]) for name in store}))
+        digests.append(digest_of({name: np.asarray(file[name][region]) for name in store}))
     return digests
 
 
 def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None) -> Content:
-    """Content of a result, all of it read and compared with its checksums, but for its seal."""
+    """Content of a result, all of it read and compared with its checksums, but for its trailer."""
     try:
         with h5py.File(path, "r") as file:
             settings = plain_json(_text(file, "settings"))
@@ -123,7 +123,7 @@ def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = 
             fraction = None if proved is None else float(proved)
     except (StoreError, *UNREADABLE, MemoryError) as error:
         raise DamagedError(f"it cannot be read: {reason(error)}") from error
-    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed), fraction)
+    return Content(identity(settings), settings, grid.n_cells, len(grid.tiling), near_zero, bool(mixed), fraction)
 
 
 def _text(file: h5py.File, name: str) -> str:
@@ -143,7 +143,7 @@ def _stored_datasets(file: h5py.File, axes: list[str], store: list[str]) -> dict
     datasets = guard.datasets(file, names)
     if datasets.keys() != {*names}:
         raise DamagedError("it holds other datasets than its settings say")
-    if any(datasets[name].size > LARGEST_AXIS_BYTES for name in axes):
+    if any(datasets[name].memory_bytes > LARGEST_AXIS_BYTES for name in axes):
         raise DamagedError("its axes have no fitting size")
     guard.refuse_dense(datasets.values(), os.stat(file.filename).st_size)
     return datasets

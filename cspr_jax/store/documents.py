@@ -7,6 +7,7 @@ user has to check it again.
 import json
 import math
 import os
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
@@ -15,16 +16,19 @@ from pydantic.functional_validators import PlainValidator
 from cspr_jax.errors import printable
 from cspr_jax.schema.identity import FORMAT_VERSION, digest
 from cspr_jax.schema.tiles import LARGEST_TILE, Tiling
-from cspr_jax.store.files.checksum import DamagedError
+from cspr_jax.store.files.checksum import DamagedError, read_regular
+from cspr_jax.store.files.disk import READ_ONLY, Disk
 from cspr_jax.store.files.guard import LARGEST_CHUNKS, LARGEST_RANK
+from cspr_jax.store.files.publishing import publish
 
 # Settings nest some six deep; functions that walk through them may be recursive.
 DEEPEST = 32
 LONGEST_NAME = 255
+LARGEST_RECORD = 64 << 20
 _LARGEST_COUNT = 10_000_000
 _LARGEST_CELLS = 1 << 46
 
-Known = TypeVar("Known", bound="Document")
+AnyDocument = TypeVar("AnyDocument", bound="Document")
 
 
 class Document(BaseModel):
@@ -117,9 +121,9 @@ class Settings(Document):
     @property
     def tiling(self) -> Tiling:
         """Tiles of the grid."""
-        known = {name: axis.count if isinstance(axis, _Range) else len(axis) for name, axis in self.axes.items()}
+        file_counts = {name: axis.count if isinstance(axis, _Range) else len(axis) for name, axis in self.axes.items()}
         step = self.orientations.divisions
-        counts = {"torsion": 2 * step, "tilt_azimuth": 2 * step, "tilt": step} | known
+        counts = {"torsion": 2 * step, "tilt_azimuth": 2 * step, "tilt": step} | file_counts
         return Tiling(tuple(counts[name] for name in self.dimensions), tuple(self.run.tile))
 
     @model_validator(mode="after")
@@ -200,14 +204,32 @@ def plain_json(text: str | bytes) -> Any:
     raise DamagedError("it is nested too deeply")
 
 
-def document(kind: type[Known], value: Any, what: str) -> Known:
+def document(kind: type[AnyDocument], value: Any, what: str) -> AnyDocument:
     """Document that JSON holds, checked against its schema."""
     try:
         return kind.model_validate(value)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise DamagedError(printable(f"{what} is not of cspr: {place or 'it'}: {first['msg']}"[:300])) from error
+        location = ".".join(map(str, first["loc"]))
+        raise DamagedError(printable(f"{what} is not of cspr: {location or 'it'}: {first['msg']}"[:300])) from error
+
+
+def write_record(disk: Disk, path: Path, record: Record) -> None:
+    """Write run.json: what a run directory belongs to, once, with a checksum of its own."""
+    content = record.model_dump()
+    text = json.dumps({**content, "checksum": digest(content)}, indent=1, allow_nan=False)
+    publish(disk, path, (text + "\n").encode(), mode=READ_ONLY)
+
+
+def read_record(path: Path) -> Record:
+    """Read run.json."""
+    content = plain_json(read_regular(path, LARGEST_RECORD))
+    if not isinstance(content, dict) or content.keys() != Record.model_fields.keys() | {"checksum"}:
+        raise DamagedError("it is not a record of cspr")
+    checksum = content.pop("checksum")
+    if digest(content) != checksum:
+        raise DamagedError("its content has changed")
+    return document(Record, content, "its content")
 
 
 def _not_finite(word: str) -> float:

@@ -1,4 +1,4 @@
-"""Shards: the file of one tile, immutable once it has its name. HDF5, with a seal."""
+"""Shards: the file of one tile, immutable once it has its name. HDF5, with a checksum trailer."""
 
 import dataclasses
 import hashlib
@@ -16,7 +16,7 @@ from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import EARLIER
 from cspr_jax.store.documents import Header, document, plain_json
 from cspr_jax.store.files import guard
-from cspr_jax.store.files.checksum import DamagedError, sealed
+from cspr_jax.store.files.checksum import DamagedError, with_trailer
 from cspr_jax.store.files.guard import ReadableDataset
 from cspr_jax.store.files.netcdf import LAYOUT, UNREADABLE, dtype_of, new_dataset, reason
 
@@ -81,7 +81,7 @@ def encode(layout: Layout, shard: Shard) -> bytes:
         for name in layout.store:
             array = shard.values[name]
             new_dataset(file, name, array.shape, dtype_of(name, layout.dtype), array.shape)[...] = array
-    return sealed(memory.getvalue())
+    return with_trailer(memory.getvalue())
 
 
 def _header(layout: Layout, shard: Shard) -> dict[str, Any]:
@@ -90,16 +90,16 @@ def _header(layout: Layout, shard: Shard) -> dict[str, Any]:
 
 
 def decode(
-    place: Path | BinaryIO,
+    source: Path | BinaryIO,
     layout: Layout,
     index: int,
     shape: tuple[int, ...],
     begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None,
 ) -> Shard:
-    """A shard, checked in every respect but its seal."""
+    """A shard, checked in every respect but its trailer."""
     kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
     try:
-        with h5py.File(place, "r") as file:
+        with h5py.File(source, "r") as file:
             header = header_of(file)
             if header.identity != layout.identity:
                 raise DamagedError("it belongs to another sweep")

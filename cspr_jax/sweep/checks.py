@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.config.keys.limits import LimitTable
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
@@ -24,39 +24,39 @@ _SPECIAL = (
     *("trajectory.max_acceleration", "trajectory.rule", "trajectory.path"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
     "point",
-    *SurroundingsKeys.model_fields,
+    *ObstacleKeys.model_fields,
 )
 # A hint names at most so many kinds.
 _FEW = 3
 
 
-def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
+def check_map(kind: MapKind, spec: SweepFile, path: Path) -> None:
     """Refuse a sweep whose keys do not fit its map."""
-    targets = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
+    targets = tuple(name for name in _TARGETS[:-1] if getattr(spec.axes, name) is not None)
     if targets not in (("x", "y"), ("radius", "azimuth")):
         raise ConfigError(path, f"axes: {', '.join(targets) or 'no targets'}: must be x and y, or radius and azimuth")
     if kind.families:
-        if "trajectory" not in keys.model_fields_set:
+        if "trajectory" not in spec.model_fields_set:
             raise ConfigError(path, f"trajectory is missing: {SweepFile.model_fields['trajectory'].description}")
-        families = tuple(name for form in MAP_KINDS[keys.map].forms for name in form.families)
-        _check_choice(keys.trajectory.family, "trajectory.family", families, path)
-    elif "family" in keys.trajectory.model_fields_set:
+        families = tuple(name for form in MAP_KINDS[spec.map].forms for name in form.families)
+        _check_choice(spec.trajectory.family, "trajectory.family", families, path)
+    elif "family" in spec.trajectory.model_fields_set:
         raise ConfigError(path, "trajectory.family: must be absent in this map, whose cells are places")
     for name in _SPECIAL:
-        if name not in kind.keys and _missing(keys, name) is None:
-            others = any(name in form.keys for form in MAP_KINDS[keys.map].forms)
-            where = f'with family = "{keys.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
+        if name not in kind.keys and _missing(spec, name) is None:
+            others = any(name in form.keys for form in MAP_KINDS[spec.map].forms)
+            where = f'with family = "{spec.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
             raise ConfigError(path, f"{name}: must be absent {where}")
-    _check_limits(kind, keys, path)
-    if keys.orientations is not None and keys.orientations.definition is not None:
-        _check_choice(keys.orientations.definition, "orientations.definition", kind.definitions, path)
-    for missing in filter(None, (_missing(keys, name) for name in kind.needs)):
+    _check_limits(kind, spec, path)
+    if spec.orientations is not None and spec.orientations.definition is not None:
+        _check_choice(spec.orientations.definition, "orientations.definition", kind.definitions, path)
+    for missing in filter(None, (_missing(spec, name) for name in kind.needs)):
         raise ConfigError(path, missing)
-    if kind.one_of and sum(_missing(keys, name) is None for name in kind.one_of) != 1:
+    if kind.one_of and sum(_missing(spec, name) is None for name in kind.one_of) != 1:
         raise ConfigError(path, f"{', '.join(kind.one_of)}: must be one of them in this map")
-    _check_start(kind, keys, path)
-    if keys.trajectory.beat in WITHOUT_BETA_HAT and keys.trajectory.beta_hat is not None:
-        raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
+    _check_start(kind, spec, path)
+    if spec.trajectory.beat in WITHOUT_BETA_HAT and spec.trajectory.beta_hat is not None:
+        raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{spec.trajectory.beat}"')
 
 
 def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
@@ -77,28 +77,28 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
             raise ConfigError(path, f"axes.{name} = {shown(float(wrong[0]))}: must be {allowed}")
 
 
-def is_given(keys: SweepFile, name: str) -> bool:
+def is_given(spec: SweepFile, name: str) -> bool:
     """Tell whether a sweep has a key."""
-    return _missing(keys, name) is None
+    return _missing(spec, name) is None
 
 
-def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
+def is_asked(spec: SweepFile, robot: RobotFile, name: str) -> bool:
     """Tell whether a sweep, or its robot, asks for what a key stands for."""
     table, _, last = name.rpartition(".")
     if table == "workspace.conditions":
-        return last in (keys.workspace or WorkspaceTable()).conditions
+        return last in (spec.workspace or WorkspaceTable()).conditions
     if table == "limits" and getattr(robot, last, None) is not None:
         return True
-    return is_given(keys, name) and getattr(getattr(keys, table) if table else keys, last) is not False
+    return is_given(spec, name) and getattr(getattr(spec, table) if table else spec, last) is not False
 
 
-def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:
+def check_store(kind: MapKind, spec: SweepFile, robot: RobotFile, path: Path) -> None:
     """Refuse to store quantities that the map does not give, or that the sweep does not ask for."""
-    for name in keys.run.store or ():
+    for name in spec.run.store or ():
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
         needed = kind.keys_of(name)
-        if needed and not any(is_asked(keys, robot, key) for key in needed):
+        if needed and not any(is_asked(spec, robot, key) for key in needed):
             raise ConfigError(path, f"run.store: {name}: must be absent without {either(map(_as_written, needed))}")
 
 
@@ -107,9 +107,9 @@ def _as_written(name: str) -> str:
     return f'"{last}" among workspace.conditions' if table == "workspace.conditions" else name
 
 
-def _missing(keys: SweepFile, name: str) -> str | None:
+def _missing(spec: SweepFile, name: str) -> str | None:
     # Return the words for a dotted key that is missing; None if it is given.
-    table: Table = keys
+    table: Table = spec
     for part in name.split("."):
         inner = getattr(table, part)
         if inner is None or part not in table.model_fields_set:
@@ -127,24 +127,24 @@ def _check_choice(value: str, name: str, allowed: tuple[str, ...], path: Path) -
         raise ConfigError(path, f'{name} = "{value}": must be {either(allowed)} in this map')
 
 
-def _check_limits(kind: MapKind, keys: SweepFile, path: Path) -> None:
+def _check_limits(kind: MapKind, spec: SweepFile, path: Path) -> None:
     takes = (*kind.limits, *["tension_margin"] * ("tension_min" in kind.limits), "uncertainty")
     for name in LimitTable.model_fields if kind.limits else ():
-        if name not in takes and getattr(keys.limits, name) is not None:
-            known = ", ".join(kind.limits)
+        if name not in takes and getattr(spec.limits, name) is not None:
+            allowed = ", ".join(kind.limits)
             raise ConfigError(
-                path, f"limits.{name}: must be absent in this map, which takes {known} alone; plans take all"
+                path, f"limits.{name}: must be absent in this map, which takes {allowed} alone; plans take all"
             )
 
 
-def _check_start(kind: MapKind, keys: SweepFile, path: Path) -> None:
-    start = keys.trajectory.start
+def _check_start(kind: MapKind, spec: SweepFile, path: Path) -> None:
+    start = spec.trajectory.start
     if kind.start == "rest" and start is not None and not start.rest:
         raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
     if kind.start != "pose" and start is not None and start.is_pose:
         poses = either(other.name for other in MAP_KINDS.values() if other.start == "pose")
         raise ConfigError(path, f"trajectory.from: must be without orientation and beta_hat but for map = {poses}")
-    start_axes = [name for name in _START if getattr(keys.axes, name) is not None]
+    start_axes = [name for name in _START if getattr(spec.axes, name) is not None]
     if kind.start == "point" and start is None and len(start_axes) < len(_START):
         raise ConfigError(
             path,

@@ -8,11 +8,10 @@ from typing import Any
 from cspr_jax.errors import RefusedError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.store.consolidation import Content
-from cspr_jax.store.documents import Record
+from cspr_jax.store.documents import Record, read_record, write_record
 from cspr_jax.store.files.checksum import DamagedError
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.reading.isolated import Reader
-from cspr_jax.store.record import read_record, write_record
 from cspr_jax.sweep.definition import Sweep
 
 

@@ -14,8 +14,7 @@ import numpy as np
 from cspr_jax import __version__
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.keys.workspace import WorkspaceTable
-from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import checked, parse_toml, read_text
+from cspr_jax.config.reading import checked, parse_toml, read_text, refuse_other_kinds
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
 from cspr_jax.errors import ConfigError, shown
@@ -43,7 +42,7 @@ class Sweep:
     Fields:
         file: where it was read.
         kind: of its map.
-        keys: its content.
+        spec: its content.
         robot: its robot, or the equivalent that its map moves, `config.equivalents`.
         grid: its axes and tiles.
         store: quantities to keep.
@@ -54,7 +53,7 @@ class Sweep:
 
     file: Path
     kind: MapKind
-    keys: SweepFile
+    spec: SweepFile
     robot: RobotFile
     grid: Grid
     store: list[str]
@@ -76,12 +75,12 @@ class Sweep:
     def prefers_cpu(self) -> bool:
         """Tell whether a GPU would take longer."""
         is_stepwise = self.kind.by_processes or self.kind.cost.seconds > MOST_SECONDS_FOR_GPU
-        return is_stepwise or self.grid.size < LEAST_FOR_GPU
+        return is_stepwise or self.grid.n_cells < LEAST_FOR_GPU
 
     @functools.cached_property
     def layout(self) -> Layout:
         """Layout that its shards share."""
-        return Layout(self.identity, self.store, self.keys.run.dtype)
+        return Layout(self.identity, self.store, self.spec.run.dtype)
 
 
 def read_sweep(path: Path) -> Sweep:
@@ -95,61 +94,61 @@ def read_sweep(path: Path) -> Sweep:
 def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     """A sweep file's parsed content, checked without computing anything."""
     refuse_other_kinds(data, "sweep", path)
-    keys = checked(SweepFile, data, path)
-    robot = resolve_robot(keys.robot, path, path.parent)
-    kind = MAP_KINDS[keys.map].of(keys.trajectory.family)
-    check_map(kind, keys, path)
+    spec = checked(SweepFile, data, path)
+    robot = resolve_robot(spec.robot, path, path.parent)
+    kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
+    check_map(kind, spec, path)
     robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
-    orientation_axes = _orientation_axes(keys) if kind.is_over_orientations else {}
-    counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
+    orientation_axes = _orientation_axes(spec) if kind.is_over_orientations else {}
+    counts = {name: _count(getattr(spec.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in orientation_axes.items()}
-    check_store(kind, keys, robot, path)
-    store = list(keys.run.store or _usual(kind, keys, robot))
+    check_store(kind, spec, robot, path)
+    store = list(spec.run.store or _usual(kind, spec, robot))
     shape = tuple(counts.values())
-    usual = tile_shape(shape, tile_cells(kind, keys, math.prod(shape)))
-    tile = usual if keys.run.tile is None else _tile(keys.run.tile, shape, path)
-    _check_size(counts, tile, usual, bytes_needed(shape, store, keys.run.dtype), path)
-    axes = {name: axis_points(getattr(keys.axes, name)) for name in data["axes"]}
+    usual = tile_shape(shape, tile_cells(kind, spec, math.prod(shape)))
+    tile = usual if spec.run.tile is None else _tile(spec.run.tile, shape, path)
+    _check_size(counts, tile, usual, bytes_needed(shape, store, spec.run.dtype), path)
+    axes = {name: axis_points(getattr(spec.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= orientation_axes
     # Keys that are not given decide nothing: a key that a later version adds leaves old identities as they are.
-    settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
+    settings = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
-    types = {name: dtype_of(name, keys.run.dtype) for name in store}
-    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text, types)
+    types = {name: dtype_of(name, spec.run.dtype) for name in store}
+    return Sweep(path, kind, spec, robot, Grid(axes, tile), store, settings, text, types)
 
 
 def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
     """The sweep that a run has recorded, whatever has become of its file."""
-    keys = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
+    spec = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
     robot, kind = (
         checked(RobotFile, settings["robot"], file, at="robot"),
-        MAP_KINDS[keys.map].of(keys.trajectory.family),
+        MAP_KINDS[spec.map].of(spec.trajectory.family),
     )
-    over_orientations = _orientation_axes(keys) if kind.is_over_orientations else {}
-    file_axes = {name: axis_points(getattr(keys.axes, name)) for name in settings["axes"]}
+    over_orientations = _orientation_axes(spec) if kind.is_over_orientations else {}
+    file_axes = {name: axis_points(getattr(spec.axes, name)) for name in settings["axes"]}
     axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}
     check_points(file_axes, file)
     run = settings["run"]
-    types = {name: dtype_of(name, keys.run.dtype) for name in run["store"]}
-    return Sweep(file, kind, keys, robot, Grid(axes, tuple(run["tile"])), list(run["store"]), settings, text, types)
+    types = {name: dtype_of(name, spec.run.dtype) for name in run["store"]}
+    return Sweep(file, kind, spec, robot, Grid(axes, tuple(run["tile"])), list(run["store"]), settings, text, types)
 
 
-def _usual(kind: MapKind, keys: SweepFile, robot: RobotFile) -> list[str]:
+def _usual(kind: MapKind, spec: SweepFile, robot: RobotFile) -> list[str]:
     # These quantities are stored where the file does not name any.
-    more = [names for key, names in kind.stored_with if is_given(keys, key)]
+    more = [names for key, names in kind.stored_with if is_given(spec, key)]
     names = dict.fromkeys((*kind.stored, *itertools.chain(*more)))
     needed = {name: kind.keys_of(name) for name in names}
-    return [name for name in names if not needed[name] or any(is_asked(keys, robot, key) for key in needed[name])]
+    return [name for name in names if not needed[name] or any(is_asked(spec, robot, key) for key in needed[name])]
 
 
 def _count(axis: AxisRange | list[float]) -> int:
     return axis.count if isinstance(axis, AxisRange) else len(axis)
 
 
-def _orientation_axes(keys: SweepFile) -> dict[str, np.ndarray]:
-    count = (keys.orientations or Orientations()).divisions
+def _orientation_axes(spec: SweepFile) -> dict[str, np.ndarray]:
+    count = (spec.orientations or Orientations()).divisions
     step = math.pi / count
     return {
         "torsion": np.arange(1 - count, count + 1) * step,
@@ -168,9 +167,9 @@ def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
     # This check comes before any memory is taken; `check_room` looks at the free room when the run starts.
-    shape, place = tuple(counts.values()), f"axes: {_cells_of(counts)}"
+    shape, label = tuple(counts.values()), f"axes: {_cells_of(counts)}"
     if needed > LARGEST_RESULT:
-        raise ConfigError(path, f"{place} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
+        raise ConfigError(path, f"{label} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
     tiles = len(Tiling(shape, tile))
     if tiles <= LARGEST_TILES:
         return
@@ -181,13 +180,13 @@ def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int,
             f"or absent: then it is {list(usual)}",
         )
     maximum = LARGEST_TILES * math.prod(usual)
-    raise ConfigError(path, f"{place} is too large: must be at most {maximum} cells; fewer points, or several sweeps")
+    raise ConfigError(path, f"{label} is too large: must be at most {maximum} cells; fewer points, or several sweeps")
 
 
 def check_room(sweep: Sweep, directory: Path, done: float) -> None:
     """Refuse a sweep whose files would not fit on the disk."""
-    folder = next(place for place in (directory, *Path(os.path.abspath(directory)).parents) if place.is_dir())
-    needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.keys.run.dtype) * (1.0 - 0.5 * done)
+    folder = next(path for path in (directory, *Path(os.path.abspath(directory)).parents) if path.is_dir())
+    needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.spec.run.dtype) * (1.0 - 0.5 * done)
     free = shutil.disk_usage(folder).free
     if needed > free:
         counts = {name: len(points) for name, points in sweep.grid.axes.items()}
@@ -213,9 +212,9 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
     """Attributes of a result file, from its sweep."""
     robot, words = sweep.robot, [sweep.kind.title, f"robot {sweep.robot.name}"]
     if "workspace" in sweep.kind.takes:
-        words += (sweep.keys.workspace or WorkspaceTable()).conditions
+        words += (sweep.spec.workspace or WorkspaceTable()).conditions
     # Turns on one ellipse have no amplitude function.
-    if sweep.kind.families and sweep.keys.trajectory.takes_amplitude and "ellipse" not in sweep.kind.takes:
+    if sweep.kind.families and sweep.spec.trajectory.takes_amplitude and "ellipse" not in sweep.kind.takes:
         words.append(f"amplitude {sweep.settings['trajectory']['amplitude']}")
     return {
         "Conventions": "CF-1.11",

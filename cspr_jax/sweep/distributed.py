@@ -182,17 +182,17 @@ class _Lost:
         self._client, self._since = client, math.inf
 
     def is_so(self) -> bool:
-        instant = time.monotonic()
-        self._since = math.inf if self._client.status == "running" else min(self._since, instant)
-        return instant - self._since > SECONDS_LOST or self._client.status == "closed"
+        current = time.monotonic()
+        self._since = math.inf if self._client.status == "running" else min(self._since, current)
+        return current - self._since > SECONDS_LOST or self._client.status == "closed"
 
 
 def _is_reached(address: str) -> bool:
     # dask tries again and again, for as long as a slow scheduler may take to answer; it also says what an address is.
-    place = urllib.parse.urlsplit(address if "://" in address else f"tcp://{address}")
+    url = urllib.parse.urlsplit(address if "://" in address else f"tcp://{address}")
     try:
-        if place.scheme in ("tcp", "tls") and place.hostname and place.port is not None:
-            socket.create_connection((place.hostname, place.port), SECONDS_TO_REACH).close()
+        if url.scheme in ("tcp", "tls") and url.hostname and url.port is not None:
+            socket.create_connection((url.hostname, url.port), SECONDS_TO_REACH).close()
     except OSError:
         return False
     except ValueError:  # its port is none

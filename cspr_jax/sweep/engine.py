@@ -15,7 +15,7 @@ from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, pr
 from cspr_jax.schema.identity import canonical_json, digest
 from cspr_jax.store.consolidation import Content, consolidate
 from cspr_jax.store.documents import Record
-from cspr_jax.store.files.checksum import DamagedError, seal_of
+from cspr_jax.store.files.checksum import DamagedError, trailer_of
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import make_folders, publish, refusal
 from cspr_jax.store.folder import RunFolder
@@ -45,7 +45,7 @@ class Options:
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
+class RunSummary:
     """Outcome of a run.
 
     Fields:
@@ -115,12 +115,12 @@ class Run:
                 self._prune()
         return self._folder.result
 
-    def go(self, executor: Executor) -> Outcome:
+    def go(self, executor: Executor) -> RunSummary:
         """Compute what is missing and publish the result."""
         with self._reader:
             return self._go(executor)
 
-    def _go(self, executor: Executor) -> Outcome:
+    def _go(self, executor: Executor) -> RunSummary:
         claims.refuse_strangers(self._folder, self._reader)
         check_room(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
         environment, accept = executor.environment(), self._options.accept_environment_change
@@ -136,19 +136,19 @@ class Run:
             if self._is_whole():  # another process finished it meanwhile
                 if self._options.prune:
                     self._prune()
-                return Outcome(self._folder.result, 0, len(self._tiling))
+                return RunSummary(self._folder.result, 0, len(self._tiling))
             make_folders(self._disk, self._folder.shards)
-            whole_tiles = self._verified(digest(environment))
-            self._folder.note("started", command=list(self._options.command), kept=len(whole_tiles))
-            computed = self._compute(executor, whole_tiles, record)
-            if len(whole_tiles) + computed < len(self._tiling):
+            finished_tiles = self._verified(digest(environment))
+            self._folder.note("started", command=list(self._options.command), kept=len(finished_tiles))
+            computed = self._compute(executor, finished_tiles, record)
+            if len(finished_tiles) + computed < len(self._tiling):
                 self._folder.note("finished", computed=computed)
-                return Outcome(self._folder.path, computed, len(whole_tiles))
+                return RunSummary(self._folder.path, computed, len(finished_tiles))
             self._consolidate(record)
             self._folder.note("finished", computed=computed)
             if self._options.prune:
                 self._prune()
-        return Outcome(self._folder.result, computed, len(whole_tiles))
+        return RunSummary(self._folder.result, computed, len(finished_tiles))
 
     # -- tiles -----------------------------------------------------------------------------------
 
@@ -162,7 +162,7 @@ class Run:
 
     def _verified(self, environment: str) -> list[int]:
         # Return the tiles whose shard is there and undamaged; anything else under their names is set aside.
-        whole_tiles = []
+        finished_tiles = []
         for path, index in self._folder.shard_names().items():
             try:
                 if index >= len(self._tiling) or path != self._folder.shard(index):
@@ -173,13 +173,13 @@ class Run:
                 continue
             if shard.environment != environment and not self._options.accept_environment_change:
                 raise RefusedError(f"{path}: was computed in another environment: --accept-environment-change keeps it")
-            whole_tiles.append(index)
-        return whole_tiles
+            finished_tiles.append(index)
+        return finished_tiles
 
-    def _compute(self, executor: Executor, whole_tiles: list[int], record: Record) -> int:
-        done = sum(self._cells(index) for index in whole_tiles)
-        self._hooks.on_tile(done, self._sweep.grid.size)
-        finished = set(whole_tiles)
+    def _compute(self, executor: Executor, finished_tiles: list[int], record: Record) -> int:
+        done = sum(self._cells(index) for index in finished_tiles)
+        self._hooks.on_tile(done, self._sweep.grid.n_cells)
+        finished = set(finished_tiles)
         self._hooks.stop.busy, self._hooks.stop.note = True, self._note_stop
         first, end = self._options.tiles or (0, len(self._tiling))
         missing = [index for index in range(first, min(end, len(self._tiling))) if index not in finished]
@@ -191,11 +191,11 @@ class Run:
                 data = encode(self._sweep.layout, computed.shard)
                 self._folder.check_held()
                 publish(self._disk, self._folder.shard(index), data)
-                self._reader.known.add(seal_of(data))
+                self._reader.trusted.add(trailer_of(data))
                 finished.add(index)
                 done += self._cells(index)
                 self._folder.note("tile", index=index)
-                self._hooks.on_tile(done, self._sweep.grid.size)
+                self._hooks.on_tile(done, self._sweep.grid.n_cells)
         if not finished.issuperset(missing):
             self._stopped(len(finished))
         return len(missing)

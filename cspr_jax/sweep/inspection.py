@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import StoreError, printable
-from cspr_jax.runtime.progress import Pace
+from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.consolidation import Content
-from cspr_jax.store.documents import Entry, Record, Settings, document, plain_json
+from cspr_jax.store.documents import Entry, Record, Settings, document, plain_json, read_record
 from cspr_jax.store.files.checksum import DamagedError, read_regular
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.netcdf import file_size
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.reading.isolated import Reader
 from cspr_jax.store.reading.result import open_result
-from cspr_jax.store.record import read_record
 from cspr_jax.store.shards import Layout
 
 LOG_TAIL = 1 << 16
@@ -38,7 +37,7 @@ def status(directory: Path) -> dict[str, Any]:
     cells, done = math.prod(tiling.shape), sum(math.prod(tiling.extent(index)) for index in there)
     result, entries = file_size(folder.result) >= 0, _entries(folder.log)
     done, time_now = cells if result else done, time.time()
-    pace = _pace(entries, tiling, done, time_now)
+    estimate = _rate_estimate(entries, tiling, done, time_now)
     state, words = ("finished", "finished") if result else _state(folder.is_held(), entries, time_now)
     return {
         "schema": 1,
@@ -53,8 +52,8 @@ def status(directory: Path) -> dict[str, Any]:
         "last": entries[0] if entries else None,
         "cells": cells,
         "cells_done": done,
-        "cells_per_second": pace.rate,
-        "seconds_left": _left(pace, cells - done, time_now if state == "running" else None),
+        "cells_per_second": estimate.rate,
+        "seconds_left": _left(estimate, cells - done, time_now if state == "running" else None),
         "state": state,
         "state_text": words,
     }
@@ -73,10 +72,12 @@ def verify(path: Path) -> dict[str, Any]:
     layout = Layout(record.identity, list(run["store"]), run["dtype"])
     with Reader() as reader:
         for index in range(len(tiling)):
-            place = folder.shard(index)
-            if not os.path.lexists(place):
+            shard_path = folder.shard(index)
+            if not os.path.lexists(shard_path):
                 report["missing"] += 1
-            elif _is_read(report, place, functools.partial(reader.shard, place, layout, index, tiling.extent(index))):
+            elif _is_read(
+                report, shard_path, functools.partial(reader.shard, shard_path, layout, index, tiling.extent(index))
+            ):
                 report["shards"] += 1
         if os.path.lexists(folder.result):
             # Shards may have been pruned: the result stands for them.
@@ -191,7 +192,7 @@ def _seconds(entry: dict[str, Any]) -> float | None:
     return None
 
 
-def _pace(entries: list[dict[str, Any]], tiling: Tiling, done: int, time_now: float) -> Pace:
+def _rate_estimate(entries: list[dict[str, Any]], tiling: Tiling, done: int, time_now: float) -> RateEstimate:
     # As the process that wrote last knows it, from its log, the newest entry first.
     events = list[tuple[float, int]]()
     for entry in entries:
@@ -202,19 +203,19 @@ def _pace(entries: list[dict[str, Any]], tiling: Tiling, done: int, time_now: fl
         if entry["event"] == "tile" and seconds is not None and isinstance(index, int) and 0 <= index < len(tiling):
             events.append((seconds, math.prod(tiling.extent(index))))
     clock = [time_now]
-    pace, cells = Pace(lambda: clock[0]), done - sum(count for _, count in events)
+    estimate, cells = RateEstimate(lambda: clock[0]), done - sum(count for _, count in events)
     for seconds, count in reversed(events):
         clock[0], cells = seconds, cells + count
-        pace.advance(cells, math.prod(tiling.shape))
+        estimate.advance(cells, math.prod(tiling.shape))
     clock[0] = time_now
-    return pace
+    return estimate
 
 
-def _left(pace: Pace, cells: int, time_now: float | None) -> float | None:
+def _left(estimate: RateEstimate, cells: int, time_now: float | None) -> float | None:
     # Time goes on while a process computes.
-    if pace.rate is None or pace.ends is None:
+    if estimate.rate is None or estimate.ends is None:
         return None
-    return cells / pace.rate if time_now is None else max(pace.ends - time_now, 0.0)
+    return cells / estimate.rate if time_now is None else max(estimate.ends - time_now, 0.0)
 
 
 def _state(is_held: bool | None, entries: list[dict[str, Any]], time_now: float) -> tuple[str, str]:

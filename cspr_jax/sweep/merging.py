@@ -18,13 +18,12 @@ from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.schema.verdicts import NOT_PROVED
-from cspr_jax.store.documents import plain_json
+from cspr_jax.store.documents import plain_json, read_record
 from cspr_jax.store.files.checksum import DamagedError
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.reading.isolated import Reader
 from cspr_jax.store.reading.result import open_result
-from cspr_jax.store.record import read_record
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep, sweep_of_settings
 from cspr_jax.sweep.signals import Stop
@@ -83,8 +82,8 @@ def _run_part(path: Path) -> Part:
             except DamagedError as error:
                 raise StoreError(printable(f"{folder.shard(index)}: {error}: run the sweep again")) from error
             for name, values in shard.values.items():
-                data[name][tiling.place(index)] = values
-            present[tiling.place(index)] = True
+                data[name][tiling.slices(index)] = values
+            present[tiling.slices(index)] = True
             shards[index] = dataclasses.replace(shard, values={})
     if not present.all() and folder.result.is_file():  # its shards were pruned
         return _result_part(path, folder.result)
@@ -136,7 +135,7 @@ class Merged:
                 cells = np.ix_(*(np.arange(n) for n in self.sweep.grid.shape))
             self._take(number, part, cells)
         tiling = self.sweep.grid.tiling
-        missing = [index for index, place in enumerate(tiling) if (self._owner[place] < 0).any()]
+        missing = [index for index, region in enumerate(tiling) if (self._owner[region] < 0).any()]
         if missing:
             raise RefusedError(_missing_line(missing, tiling))
 
@@ -167,12 +166,12 @@ class Merged:
             yield Computed(self._shard(index), self.environment())
 
     def _shard(self, index: int) -> Shard:
-        place = self.sweep.grid.tiling.place(index)
-        values = {name: np.ascontiguousarray(data[place]) for name, data in self._data.items()}
+        region = self.sweep.grid.tiling.slices(index)
+        values = {name: np.ascontiguousarray(data[region]) for name, data in self._data.items()}
         for part in self._parts:
             if part.sweep.identity == self.sweep.identity and index in part.shards:
                 return dataclasses.replace(part.shards[index], values=values)
-        owners = sorted({digest(self._parts[number].environment) for number in np.unique(self._owner[place])})
+        owners = sorted({digest(self._parts[number].environment) for number in np.unique(self._owner[region])})
         near_zero = int((np.abs(values["margin"]) < _NEAR_ZERO).sum()) if "margin" in values else 0
         undecided = _undecided(values) if all(part.says_proved for part in self._parts) else None
         return Shard(index, owners[0] if len(owners) == 1 else digest(owners), near_zero, values, undecided)

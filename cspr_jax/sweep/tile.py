@@ -30,7 +30,7 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            self._cells: GridMap = sweep.kind.load()(sweep.robot, sweep.keys, sweep.file)
+            self._cells: GridMap = sweep.kind.load()(sweep.robot, sweep.spec, sweep.file)
             self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:
@@ -38,7 +38,7 @@ class TileMap:
         tiling = self._sweep.grid.tiling
         try:
             with double_precision():
-                answers = self._cells(self._sweep.grid.cells(tiling.place(index)))
+                answers = self._cells(self._sweep.grid.cells(tiling.slices(index)))
         except (MemoryError, jax.errors.JaxRuntimeError) as error:
             if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):
                 raise ResourceError(

@@ -33,22 +33,22 @@ JUDGED_SECONDS, OBSTACLE_SECONDS = 5e-3, 1e-3
 ARCS = 30
 
 
-def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
+def cell_seconds(kind: MapKind, spec: SweepFile) -> float:
     """Estimate the time that a cell takes on one core."""
-    names = [row.name for row in LIMITS if is_given(keys, f"limits.{row.name}")]
+    names = [limit.name for limit in LIMITS if is_given(spec, f"limits.{limit.name}")]
     limits = kind.cost.limits * sum(LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names)
-    if is_given(keys, "limits.uncertainty"):
+    if is_given(spec, "limits.uncertainty"):
         limits += kind.cost.uncertainty * UNCERTAINTY_SECONDS
-    conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
-    if keys.surroundings:
-        conditions += JUDGED_SECONDS + OBSTACLE_SECONDS * len(keys.obstacle or ())
-    divisions = (keys.orientations or Orientations()).divisions
-    motion = (kind.cost.seconds + limits) * (keys.trajectory.max_arcs / ARCS if kind.families else 1.0)
+    conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(spec, f"workspace.{name}"))
+    if spec.obstacle_keys:
+        conditions += JUDGED_SECONDS + OBSTACLE_SECONDS * len(spec.obstacle or ())
+    divisions = (spec.orientations or Orientations()).divisions
+    motion = (kind.cost.seconds + limits) * (spec.trajectory.max_arcs / ARCS if kind.families else 1.0)
     return motion + conditions + kind.cost.orientation * 4 * divisions**3
 
 
-def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:
+def tile_cells(kind: MapKind, spec: SweepFile, cells: int) -> int:
     """Choose the largest number of cells of a tile."""
-    seconds = cell_seconds(kind, keys)
+    seconds = cell_seconds(kind, spec)
     maximum = min(kind.cells, math.ceil(TILE_SECONDS / seconds))
     return min(maximum, max(math.ceil(cells / FEWEST_TILES), math.ceil(SHORTEST_SECONDS / seconds)))

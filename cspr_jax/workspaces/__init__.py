@@ -21,7 +21,7 @@ Files, each importing only from those above it:
     clearances            clearances of robots at rest
     static_poses          all conditions together, and sets of orientations
     static_cells          all conditions together over cells
-    acceleration_search   feasible accelerations at many places
+    acceleration_search   feasible accelerations at many positions
     sensitivities         sensitivities to errors of the cable lengths
     map                   maps of workspaces
     accelerations_map     maps of feasible accelerations

@@ -1,4 +1,4 @@
-"""Feasible accelerations at many places: arrays in, answers out."""
+"""Feasible accelerations at many positions: arrays in, answers out."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from cspr_jax.robots.statics.wrench_sets import Faces
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
-# Number of places computed at a time; fewer for robots on many cables, whose faces are many.
+# Number of positions computed at a time; fewer for robots on many cables, whose faces are many.
 BATCH = 4096
-_ROOM = 1 << 22
+_LARGEST_BATCH_ENTRIES = 1 << 22
 
 
-def _size(robot: PointMassRobot, power: int) -> int:
-    return max(min(BATCH, _ROOM // robot.n_cables**power), 1)
+def _batch_size(robot: PointMassRobot, power: int) -> int:
+    return max(min(BATCH, _LARGEST_BATCH_ENTRIES // robot.n_cables**power), 1)
 
 
 def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationRanges:
-    """Sizes of the sets of feasible accelerations at many places."""
+    """Dimensions of the sets of feasible accelerations at many positions."""
     kernel = partial(acceleration_ranges_at, robot, limits, touchable_limits(robot, limits))
-    return in_batches(kernel, positions, batch_size=_size(robot, 6))
+    return in_batches(kernel, positions, batch_size=_batch_size(robot, 6))
 
 
 @jax.jit
@@ -39,24 +39,28 @@ def _faces(robot: PointMassRobot, limits: Limits, positions) -> Faces:
 
 
 def faces_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> Faces:
-    """Faces of the sets of feasible accelerations at many places."""
-    return in_batches(partial(_faces, robot, limits), positions, batch_size=_size(robot, 3))
+    """Faces of the sets of feasible accelerations at many positions."""
+    return in_batches(partial(_faces, robot, limits), positions, batch_size=_batch_size(robot, 3))
 
 
 @jax.jit
-def _judged(robot: PointMassRobot, arguments):
+def _margins_and_verdicts(robot: PointMassRobot, arguments):
     def one(faces, wider, position, acceleration):
         return faces.margin(acceleration), verdict(robot, faces, wider, position, acceleration)
 
     return jax.vmap(one)(*arguments)
 
 
-def judged(
+def margins_and_verdicts(
     robot: PointMassRobot,
     faces: Faces,
     wider: Faces,
     positions: Float[np.ndarray, "n 3"],
     accelerations: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Margins and verdicts of accelerations, one at each place, from faces as `verdict` takes them."""
-    return in_batches(partial(_judged, robot), (faces, wider, positions, accelerations), batch_size=_size(robot, 3))
+    """Margins and verdicts of accelerations, one at each position, from faces as `verdict` takes them."""
+    return in_batches(
+        partial(_margins_and_verdicts, robot),
+        (faces, wider, positions, accelerations),
+        batch_size=_batch_size(robot, 3),
+    )

@@ -19,12 +19,12 @@ class FeasibleAccelerationMap(PointMassMap):
 
     any_cables = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse robots on so many cables that the corners of their faces need too much memory."""
-        super().__init__(robot_file, keys, file)
+        super().__init__(robot_file, spec, file)
         if self._problem.robot.n_cables > MOST_CABLES:
-            place, key = robot_file.placed("base_points", file)
-            raise ConfigError(place, f"{key}: must be at most {MOST_CABLES} in this map")
+            source, key = robot_file.placed("base_points", file)
+            raise ConfigError(source, f"{key}: must be at most {MOST_CABLES} in this map")
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -38,12 +38,16 @@ class FeasibleAccelerationMap(PointMassMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, margin = answers["verdict"] == 0, answers["acceleration_margin"]
-        room, mass = (float(np.asarray(x)) for x in (BOUNDARY * self._problem.robot.gravity, self._problem.robot.mass))
+        tolerance, mass = (
+            float(np.asarray(x)) for x in (BOUNDARY * self._problem.robot.gravity, self._problem.robot.mass)
+        )
         level, maximum = answers["level_acceleration"], answers["level_acceleration_max"]
         return {
             "a feasible cell with a margin below zero": feasible & ~(margin > -self._missed * self._weight / mass),
-            "an infeasible cell with a margin above zero": ~feasible & (margin > room) & (answers["verdict"] != 2048),
-            "a margin that limits of the tensions make larger": margin > answers["static_margin"] + room,
-            "a level acceleration above the largest": level > maximum * (1.0 + BOUNDARY) + room,
+            "an infeasible cell with a margin above zero": ~feasible
+            & (margin > tolerance)
+            & (answers["verdict"] != 2048),
+            "a margin that limits of the tensions make larger": margin > answers["static_margin"] + tolerance,
+            "a level acceleration above the largest": level > maximum * (1.0 + BOUNDARY) + tolerance,
             "a number that is none": sum(np.isnan(values) for values in answers.values()) > 0,
         }

@@ -1,9 +1,10 @@
 """Requirements of all robots within an uncertainty: of the lightest and the heaviest one, wherever mass centres are.
 
 At a pose with given spools the wrenches that tensions within limits supply are a convex set, and those that a mass
-needs with its centre at a given place are linear in the mass: what both the smallest and the largest mass have, all
-masses between have. A force f that acts at a mass centre displaced by d adds d x f to the moment about its place. For a
-vertical force these moments fill a disk; for forces of all directions they lie in a ball, not each with each.
+needs with its centre at a given position are linear in the mass: what both the smallest and the largest mass have, all
+masses between have. A force f that acts at a mass centre displaced by d adds d x f to the moment about its nominal
+position. For a vertical force these moments fill a disk; for forces of all directions they lie in a ball, not each with
+each.
 """
 
 import dataclasses
@@ -23,11 +24,11 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 
 
 class MassSearch(NamedTuple):
-    """Searches for robots of one mass, spools in their places.
+    """Searches for robots of one mass, spools at their positions.
 
     Fields:
-        enclosing: of wrenches that include those of all places of the mass centre.
-        attained: of wrenches each of which some place of the mass centre needs.
+        enclosing: of wrenches that include those of all positions of the mass centre.
+        attained: of wrenches each of which some position of the mass centre needs.
     """
 
     enclosing: WorkspaceSearch
@@ -39,7 +40,7 @@ class AllRobots:
     """All robots within an uncertainty.
 
     Fields:
-        spools: how far each spool may be from its place, m.
+        spools: how far each spool may be from its position, m.
         searches: of each condition on the cables, for the masses that decide.
     """
 
@@ -57,13 +58,13 @@ def mass_searches(
 ) -> list[MassSearch]:
     """Searches of a condition for the masses that decide."""
     is_closure = ask(robot).condition == CLOSURE
-    pull = float(robot.gravity) * has_weight + acceleration
-    factor = 1.0 if is_closure or pull == 0.0 else float(uncertainty.mass_factor)
+    total_acceleration = float(robot.gravity) * has_weight + acceleration
+    factor = 1.0 if is_closure or total_acceleration == 0.0 else float(uncertainty.mass_factor)
     searches = []
     for ratio in sorted({1.0 / factor, factor}):
         other = with_mass(robot, jnp.asarray(ratio))
         requested = ask(other)
-        radius = float(uncertainty.mass_centre) * float(other.mass) * pull
+        radius = float(uncertainty.mass_centre) * float(other.mass) * total_acceleration
         enclosing, is_attained = _off_centre(other, requested.wrenches, radius, is_vertical=acceleration == 0.0)
         attained = WorkspaceSearch(other, requested)
         if is_closure or radius == 0.0:

@@ -6,10 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from cspr_jax.build.limits import build_limits
 from cspr_jax.build.orientations import given_quaternion
-from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import build_scene
+from cspr_jax.build.robots import build_limits, build_robot
+from cspr_jax.build.scenes import build_scene
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
@@ -41,14 +40,14 @@ DIVISIONS = 12
 class WorkspaceMap(GridMap):
     """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse conditions that do not apply to the robot."""
-        self._keys, self._file = keys, file
+        self._keys, self._file = spec, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        self._workspace = keys.workspace or WorkspaceTable()
+        self._workspace = spec.workspace or WorkspaceTable()
         self._refuse_unused()
-        self._limits = build_limits(robot_file, keys.limits, file)
-        self._robot = centred(build_robot(robot_file, keys.trajectory, file))[0]
+        self._limits = build_limits(robot_file, spec.limits, file)
+        self._robot = centred(build_robot(robot_file, spec.trajectory, file))[0]
         self._row = PATTERNS[self._robot.pattern]
         if not self._row.is_body:
             for name in ("orientation", "orientations"):
@@ -69,7 +68,7 @@ class WorkspaceMap(GridMap):
             all_robots = self._all_robots(robot_file, names)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
-        around, speeds = self._surroundings(robot_file), self._speeds(robot_file)
+        around, speeds = self._around(robot_file), self._speeds(robot_file)
         is_centre = self._workspace.point == "mass-centre"
         self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre)
         self._cells = None
@@ -82,7 +81,7 @@ class WorkspaceMap(GridMap):
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(self._file, f"limits.{name}: {allowed}")
 
-    def _surroundings(self, robot_file: RobotFile) -> Scene | None:
+    def _around(self, robot_file: RobotFile) -> Scene | None:
         if INTERFERENCE not in self._workspace.conditions:
             return None
         return build_scene(self._robot, robot_file, self._frame, self._workspace, self._file, at="workspace.")
@@ -174,23 +173,23 @@ class WorkspaceMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        places = self._targets(cells)
+        positions = self._targets(cells)
         if self._samples is not None:
             kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
-            set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
-            return set_answers | dict.fromkeys(("cell_side", "cell_open"), np.zeros(len(places), np.int16))
-        quaternions = np.repeat(self._quaternion, len(places), axis=0)
+            set_answers = over_orientations(self._poses, positions, self._samples, self._volume, kind)
+            return set_answers | dict.fromkeys(("cell_side", "cell_open"), np.zeros(len(positions), np.int16))
+        quaternions = np.repeat(self._quaternion, len(positions), axis=0)
         if any(name in cells for name in TILT_TORSION):
-            angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
+            angles = np.stack([cells.get(name, np.zeros(len(positions))) for name in TILT_TORSION], axis=1)
             if self._row.is_planar:
                 angles[:, 0] = 0.5 * math.pi
             quaternions = products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), quaternions)
-        answers = self._poses(places, quaternions)
-        sides, reasons = np.zeros((2, len(places)), np.int16)
+        answers = self._poses(positions, quaternions)
+        sides, reasons = np.zeros((2, len(positions)), np.int16)
         if self._cells is not None:
-            answers["verdict"] = self._cells.verdicts(places, answers["verdict"])
+            answers["verdict"] = self._cells.verdicts(positions, answers["verdict"])
             if self._workspace.prove:
-                sides, reasons = self._cells(places, self._half_sizes(cells))
+                sides, reasons = self._cells(positions, self._half_sizes(cells))
         fraction = (answers["verdict"] == 0).astype(float)
         return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
 

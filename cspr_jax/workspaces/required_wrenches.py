@@ -45,7 +45,7 @@ class RequiredWrenches:
         if self.points is None:
             raise TypeError(NO_POINTS)
         half = np.zeros(self.points.shape[1]) if self.box is None else self.box
-        signs = itertools.product(*[(-1.0, 1.0) if size else (0.0,) for size in half])
+        signs = itertools.product(*[(-1.0, 1.0) if h else (0.0,) for h in half])
         return np.concatenate([self.points + np.array(sign) * half for sign in signs])
 
     @property
@@ -77,6 +77,6 @@ class RequiredWrenches:
         return (self.points is None or len(self.points) == 1) and self.box is None and not self.ellipsoids
 
     @property
-    def size(self) -> float:
-        """Largest component in size; 0 for a weight that is not known."""
+    def magnitude(self) -> float:
+        """Largest absolute component; 0 for a weight that is not known."""
         return max((float(np.abs(part).max()) for part in self.spanning), default=0.0)

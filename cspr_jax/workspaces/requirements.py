@@ -47,7 +47,7 @@ def check_cables(robot: AnyRobot) -> None:
     if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
         maximum = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
         allowed = f"at most {maximum} for workspaces of {robot.dof} degrees of freedom"
-        raise InputError("robot", None, f"must have {allowed}", fault=f"{robot.n_cables} cables")
+        raise InputError("robot", None, f"must have {allowed}", problem=f"{robot.n_cables} cables")
 
 
 def requirement(
@@ -92,7 +92,7 @@ def required_wrenches(
         ellipsoids.append(_not_negative("wrench_ellipsoid", _finite(robot, "wrench_ellipsoid", ellipsoid, 1)))
     if acceleration is not None:
         if row.is_jointed:
-            raise InputError("acceleration", acceleration, "must be absent", fault="of a robot on a joint")
+            raise InputError("acceleration", acceleration, "must be absent", problem="of a robot on a joint")
         radius = numbers("acceleration", acceleration, "a number >= 0, in m/s^2")
         if radius.ndim or not 0.0 <= radius < np.inf:
             raise InputError("acceleration", acceleration, "a number >= 0, in m/s^2")
@@ -105,7 +105,7 @@ def _finite(robot: AnyRobot, key: str, entries: Any, ndim: int) -> np.ndarray:
     allowed = "finite numbers of shape " + (f"({robot.dof},)" if ndim == 1 else f"(k, {robot.dof}), k >= 1")
     values = numbers(key, entries, allowed)
     if values.ndim != ndim or not values.size or values.shape[-1] != robot.dof:
-        raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {values.shape}")
+        raise InputError(key, None, f"must be {allowed}", problem=f"an array of shape {values.shape}")
     if not np.isfinite(values).all():
         raise InputError(key, values.tolist(), allowed)
     if PATTERNS[robot.pattern].along_line and values[..., 3:].any():

@@ -32,8 +32,8 @@ from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Bounds of a margin in single precision may lie this far apart, as part of the largest limit.
-APART = 1e-3
+# Bounds of a margin in single precision may differ by this part of the largest limit.
+SINGLE_ERROR = 1e-3
 PART = 1 << 18
 # Poses of a batch where poses are few, and where a search is prepared.
 BATCH = 1024
@@ -114,7 +114,7 @@ class WorkspaceSearch:
         if requirement.condition == CLOSURE:
             self._measure = "closure"
         else:
-            sizes = requirement.wrenches.size, float(robot.mass * robot.gravity)
+            sizes = requirement.wrenches.magnitude, float(robot.mass * robot.gravity)
             self._boundary *= np.abs([*requirement.low, *requirement.high[np.isfinite(requirement.high)], *sizes]).max()
         matrices = self._trials()
         self._choices = facet_normals.choices_of(matrices[:FEW_TRIALS])
@@ -155,16 +155,16 @@ class WorkspaceSearch:
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
         regular = np.zeros((0, self.robot.dof, self.robot.n_cables))
         for widening in range(WIDENINGS):
-            places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
+            positions = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
             quaternions = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
             if row.is_planar:
                 quaternions[:, [1, 3]] = 0.0
-            matrices = self._matrices(places, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
+            matrices = self._matrices(positions, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
             regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
             if len(regular) >= FEW_TRIALS:
                 return regular
         allowed = "must leave room for poses where no cable ends within its pulley"
-        raise InputError("pulley_radius", None, allowed, fault="none among the spools, nor around them")
+        raise InputError("pulley_radius", None, allowed, problem="none among the spools, nor around them")
 
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Return wrench matrices, moments over the length.
@@ -176,28 +176,28 @@ class WorkspaceSearch:
         count = len(poses.positions)
         margin, is_open, is_outside = np.full(count, np.nan), np.ones(count, bool), np.zeros(count, bool)
         for stage, accepts in self._stages():
-            places = np.flatnonzero(is_open)
-            if len(places) == 0 or len(places) < min(FEW, count):
+            indices = np.flatnonzero(is_open)
+            if len(indices) == 0 or len(indices) < min(FEW, count):
                 break
-            bounds = stage(poses.rows(places))
+            bounds = stage(poses.rows(indices))
             is_known = accepts(bounds)
-            known = bounds[is_known]
-            margin[places[is_known]] = 0.5 * (known.real + known.imag)
-            is_open[places[is_known]] = False
+            decided = bounds[is_known]
+            margin[indices[is_known]] = 0.5 * (decided.real + decided.imag)
+            is_open[indices[is_known]] = False
         is_open |= np.abs(margin) <= self._boundary
-        places = np.flatnonzero(is_open)
-        if len(places):
-            margin[places], is_outside[places] = self._exactly(poses.rows(places))
+        indices = np.flatnonzero(is_open)
+        if len(indices):
+            margin[indices], is_outside[indices] = self._exactly(poses.rows(indices))
         return margin, is_open, is_outside
 
     def _stages(self):
-        def is_known(bounds, apart=1.0):
+        def is_known(bounds, factor=1.0):
             with np.errstate(invalid="ignore"):
-                return (bounds.real == bounds.imag) | (bounds.imag - bounds.real <= apart * self._boundary)
+                return (bounds.real == bounds.imag) | (bounds.imag - bounds.real <= factor * self._boundary)
 
         def is_clear(bounds):
             is_beyond = (bounds.real > self._boundary) | (bounds.imag < -self._boundary)
-            return is_beyond & is_known(bounds, APART / BOUNDARY)
+            return is_beyond & is_known(bounds, SINGLE_ERROR / BOUNDARY)
 
         if not len(self._choices.table):  # whatever the pose, the cables do not span all components
             return
@@ -210,8 +210,8 @@ class WorkspaceSearch:
 
     def batch(self, dtype: type) -> int:
         """Length of a batch on a CPU where poses are many."""
-        rows = self.robot.dof * self.robot.n_cables
-        return 1 << int(np.log2(BYTES / (rows * np.dtype(dtype).itemsize)))
+        entries = self.robot.dof * self.robot.n_cables
+        return 1 << int(np.log2(BYTES / (entries * np.dtype(dtype).itemsize)))
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
         """Compiled margins of a batch of poses."""
@@ -230,8 +230,8 @@ class WorkspaceSearch:
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
-        def compiled(place, quaternion, load):
-            columns, loss = geometry.wrench_columns(robot, place, quaternion, length)
+        def compiled(position, quaternion, load):
+            columns, loss = geometry.wrench_columns(robot, position, quaternion, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
                 return kernels.by_normals(columns, loss, wrenches, tension_limits, choices, **options)
@@ -251,8 +251,8 @@ class WorkspaceSearch:
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), quaternions, loads
             # Use two lengths only, since each is compiled.
-            size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
-            return in_batches(lambda x: compiled(*x), batch, batch_size=size)
+            length = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
+            return in_batches(lambda x: compiled(*x), batch, batch_size=length)
 
         return stage
 
@@ -260,10 +260,10 @@ class WorkspaceSearch:
     def _relations(self) -> facet_normals.CableSubsets:
         # Return only the cables of each cocircuit, in the order of the block.
         table, counts = self._choices
-        places = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
-        sorting = np.argsort(places, axis=1)
+        indices = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
+        sorting = np.argsort(indices, axis=1)
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
-        return facet_normals.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
+        return facet_normals.CableSubsets(np.take_along_axis(indices, sorting, 1), ordered)
 
     def required(self, position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"]) -> RequiredWrenches:
         """Wrenches that the cables must supply at a pose."""

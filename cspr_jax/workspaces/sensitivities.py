@@ -1,4 +1,4 @@
-"""Sensitivities of a robot at many places: arrays in, answers out."""
+"""Sensitivities of a robot at many positions: arrays in, answers out."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from cspr_jax.robots.statics.sensitivities import Sensitivities, pair_sensitivit
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-BATCH = 8192  # places at a time
+BATCH = 8192  # positions at a time
 
 
 @jax.jit
-def _of_point_mass(robot: PointMassRobot, places) -> Sensitivities:
-    return jax.vmap(partial(sensitivities, robot))(places)
+def _of_point_mass(robot: PointMassRobot, positions) -> Sensitivities:
+    return jax.vmap(partial(sensitivities, robot))(positions)
 
 
 @jax.jit
 def _of_platform(robot: PlatformRobot, poses) -> Sensitivities:
-    return jax.vmap(lambda place, quaternion: sensitivities(robot, place, matrix(quaternion)))(*poses)
+    return jax.vmap(lambda position, quaternion: sensitivities(robot, position, matrix(quaternion)))(*poses)
 
 
 @jax.jit
-def _of_pairs(geometry, places) -> Sensitivities:
-    exits, along, size = geometry
-    return jax.vmap(partial(pair_sensitivities, exits, along, size))(places)
+def _of_pairs(geometry, positions) -> Sensitivities:
+    exits, along, length = geometry
+    return jax.vmap(partial(pair_sensitivities, exits, along, length))(positions)
 
 
 class SensitivitySearch:
@@ -66,7 +66,7 @@ class SensitivitySearch:
     def __call__(
         self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None = None
     ) -> Sensitivities:
-        """Sensitivities at places."""
+        """Sensitivities at positions."""
         robot, pairs = self.robot, self._pairs
         if isinstance(robot, PointMassRobot):
             return in_batches(partial(_of_point_mass, robot), positions, batch_size=BATCH)

@@ -19,21 +19,21 @@ class SensitivityMap(GridMap):
 
     any_cables = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse robots on more cables than degrees of freedom, whose cable lengths are not independent."""
-        super().__init__(robot_file, keys, file)
-        robot = kernel_robot(robot_file, keys.trajectory, file, any_cables=True)
+        super().__init__(robot_file, spec, file)
+        robot = kernel_robot(robot_file, spec.trajectory, file, any_cables=True)
         if robot.n_cables != robot.dof:
-            place, key = robot_file.placed("base_points", file)
-            raise ConfigError(place, f"{key}: {robot.n_cables} points: must be {robot.dof} in this map")
+            source, key = robot_file.placed("base_points", file)
+            raise ConfigError(source, f"{key}: {robot.n_cables} points: must be {robot.dof} in this map")
         self._search = SensitivitySearch(robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        places = self._targets(cells)
+        positions = self._targets(cells)
         if self._keys.point == "origin":
-            places = mass_centres(self._search.robot, places, None)
-        return self._search(places)._asdict()
+            positions = mass_centres(self._search.robot, positions, None)
+        return self._search(positions)._asdict()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""

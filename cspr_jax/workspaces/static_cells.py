@@ -172,8 +172,8 @@ class RestCells:
         moves = np.broadcast_to(moved.exits[:, None], exits.shape[:2])
 
         def bounds(chosen: np.ndarray, exits: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            place = mass_positions[chosen], half[chosen]
-            return clearance_bounds(self._robot, around, self._quaternion, *place, exits, moves[chosen])
+            cells = mass_positions[chosen], half[chosen]
+            return clearance_bounds(self._robot, around, self._quaternion, *cells, exits, moves[chosen])
 
         if not self._spools:
             return bounds(np.arange(len(half)), exits, moves)

@@ -1,4 +1,4 @@
-"""Poses at rest against all conditions of a workspace, and sets of orientations at places. Arrays in, answers out."""
+"""Poses at rest, and sets of orientations at positions, against all conditions of a workspace; arrays in and out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MARGINS = (
 )
 NEAREST = "nearest_bodies"
 BATCH = 4096
-# Poses that are answered at a time, where each place has many orientations.
+# Poses that are answered at a time, where each position has many orientations.
 AT_ONCE = 1 << 19
 
 PoseColumns = dict[str, np.ndarray]
@@ -74,19 +74,19 @@ class RestPoses:
     def __call__(self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> PoseColumns:
         """Tell whether poses meet all conditions."""
         origins = self.origins(positions, quaternions)
-        places, count = mass_centres(self.robot, origins, quaternions), len(origins)
+        centres, count = mass_centres(self.robot, origins, quaternions), len(origins)
         columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
         verdict = np.zeros(count, FLAGS)
         for condition, search in self.searches.items():
-            answers = search(places, quaternions)
+            answers = search(centres, quaternions)
             verdict |= answers.verdict
             name = "closure_margin" if condition == CLOSURE else "wrench_margin"
             columns[name] = np.fmin(columns[name], answers.margin)
         if self.capacity is not None:
-            columns["capacity_margin"] = self.capacity(places, quaternions).margin
+            columns["capacity_margin"] = self.capacity(centres, quaternions).margin
         columns[NEAREST] = np.zeros(count, np.int16)
         if self.around is not None:
-            distances = at_rest(self.robot, self.around, places, quaternions)
+            distances = at_rest(self.robot, self.around, centres, quaternions)
             columns |= {"clearance": distances.clearance, NEAREST: nearest_bodies(self.around, distances)}
             columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
             verdict |= flags(distances)
@@ -95,37 +95,37 @@ class RestPoses:
             columns[name] = slack.min(1)
         return {"verdict": conjunction(verdict), **columns}
 
-    def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        poses = places, quaternions
+    def _lengths(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        poses = positions, quaternions
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, batch_size=BATCH)
 
-    def _depths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+    def _depths(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Depths (n, k) of the mass centre, or joint, of the attachment points and of the corners of the shape.
         robot = self.robot
         if not isinstance(robot, PlatformRobot):
-            return places[:, 2:]
+            return positions[:, 2:]
         points = np.concatenate([np.zeros((1, 3)), np.asarray(robot.platform_points)])
         corners = None if self.around is None else shape_corners(robot, self.around)
         points = points if corners is None else np.concatenate([points, corners])
         w, x, y, z = quaternions.T
         lowest_row = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-        return places[:, 2:] + lowest_row @ points.T
+        return positions[:, 2:] + lowest_row @ points.T
 
     def limited(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Iterator[tuple[str, Verdict, np.ndarray, np.ndarray]]:
         """Quantity, flag and slacks of each limit, and by how much it may be missed."""
-        places = mass_centres(self.robot, origins, quaternions)
+        centres = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
-            slack, size = float(self.limits.floor) - self._depths(places, quaternions), spool_radius(self.robot)
-            yield "floor_margin", Verdict.BELOW_FLOOR, slack, TOUCHED * np.asarray(size)
+            slack, radius = float(self.limits.floor) - self._depths(centres, quaternions), spool_radius(self.robot)
+            yield "floor_margin", Verdict.BELOW_FLOOR, slack, TOUCHED * np.asarray(radius)
         if self.limits.cable_length_max is not None:
             longest = np.asarray(self.limits.cable_length_max)
-            slack = longest - self._lengths(places, quaternions)
+            slack = longest - self._lengths(centres, quaternions)
             yield "length_margin", Verdict.CABLE_TOO_LONG, slack, TOUCHED * longest
         if self.speeds is not None:
             slack = self.speeds.margins(origins, quaternions)
-            yield "speed_margin", Verdict.CABLE_TOO_FAST, slack, TOUCHED * self.speeds.most
+            yield "speed_margin", Verdict.CABLE_TOO_FAST, slack, TOUCHED * self.speeds.maximum
 
 
 def over_orientations(
@@ -135,18 +135,20 @@ def over_orientations(
     volume: Float[np.ndarray, "k"],
     kind: OrientationSet,
 ) -> PoseColumns:
-    """Tell whether places belong to the workspace of a set of orientations."""
+    """Tell whether positions belong to the workspace of a set of orientations."""
     parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
     for start in range(0, len(origins), step):
-        places = origins[start : start + step]
-        columns = ask(np.repeat(places, count, axis=0), np.tile(orientations, (len(places), 1)))
-        parts.append(_of_places({name: values.reshape(-1, count) for name, values in columns.items()}, volume, kind))
+        positions = origins[start : start + step]
+        columns = ask(np.repeat(positions, count, axis=0), np.tile(orientations, (len(positions), 1)))
+        parts.append(
+            _over_positions({name: values.reshape(-1, count) for name, values in columns.items()}, volume, kind)
+        )
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _of_places(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
-    # Reduce columns (n_places, n_orientations) to columns (n_places,).
+def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
+    # Reduce columns (n_positions, n_orientations) to columns (n_positions,).
     verdict = columns["verdict"]
     inside = verdict == 0
     is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)

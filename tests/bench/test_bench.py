@@ -136,7 +136,7 @@ def test_the_numpy_version_of_the_six_cable_check(small_bench):
     found = six_cables._numpy_checks(given)
     for batch in six_cables.batches(given):
         wanted = np.asarray(six_cables.tensions(given.robot, batch, single_precision=False))[: batch.real]
-        mine = found[given.arcs == batch.arcs] * 6.0 * six_cables.PLACE[2] / float(given.robot.gravity)
+        mine = found[given.arcs == batch.arcs] * 6.0 * six_cables.TARGET[2] / float(given.robot.gravity)
         np.testing.assert_allclose(mine, wanted, rtol=1e-8, atol=1e-9)
 
 

@@ -285,7 +285,7 @@ def test_keys_that_do_not_fit(tmp_path, change, words):
 def test_numbers_that_contradict_each_other_are_noticed(tmp_path):
     (tmp_path / "s.toml").write_text(text())
     sweep = read_sweep(tmp_path / "s.toml")
-    own = LaunchRangeMap(sweep.robot, sweep.keys, sweep.file)
+    own = LaunchRangeMap(sweep.robot, sweep.spec, sweep.file)
     good = dict.fromkeys(("release_speed", "duration", "flight_time", "release_x", "release_y", "release_z"), 1.0)
     good |= {"release_time": 0.5, "largest_margin": 0.2}
     answers = {name: np.full(5, value) for name, value in good.items()} | {"verdict": np.array([0, 0, 0, 0, 1])}

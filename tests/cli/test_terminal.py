@@ -15,7 +15,7 @@ from rich.table import Table
 
 from cspr_jax.errors import RefusedError, ResourceError, printable
 from cspr_jax.numerics import cores, elementary
-from cspr_jax.runtime import surroundings, terminal, xla
+from cspr_jax.runtime import process_environment, terminal, xla
 
 HOSTILE = [
     "Halle [nord] v2",
@@ -139,7 +139,7 @@ def test_threads_that_cannot_be_started(monkeypatch):
 
     monkeypatch.setattr(threading.Thread, "start", start)
     with pytest.raises(ResourceError, match="no more threads can be started"):
-        surroundings.check_threads()
+        process_environment.check_threads()
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_threads_that_cannot_be_started(monkeypatch):
     ],
 )
 def test_what_the_machine_lacks(error, words):
-    line = surroundings.shortage(error)
+    line = process_environment.shortage(error)
     assert line is None if words is None else words in line
 
 
@@ -204,7 +204,7 @@ def test_settings_of_a_notebook_and_no_home(monkeypatch):
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.delenv("CSPR_CACHE_DIR", raising=False)
     monkeypatch.setattr(Path, "home", home)
-    surroundings.settle()
+    process_environment.configure()
     assert os.environ["MPLBACKEND"] == "Agg" and os.environ["HOME"] == os.devnull
     assert xla._folder(None, lambda line: None) is None
 
@@ -229,7 +229,7 @@ def test_threads_of_linear_algebra_do_not_wait_busily(given, expected):
 def test_fortran_is_loaded_where_it_is_used():
     """SciPy asks NumPy for all names that it has; who uses one of them gets it."""
     code = (
-        "import sys; from cspr_jax.runtime import surroundings; surroundings.defer_fortran(); "
+        "import sys; from cspr_jax.runtime import process_environment; process_environment.defer_fortran(); "
         "import scipy.interpolate, numpy; print('numpy.f2py.crackfortran' in sys.modules); "
         "print(callable(numpy.f2py.get_include), 'numpy.f2py.crackfortran' in sys.modules)"
     )

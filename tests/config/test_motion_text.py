@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cspr_jax.config.motions import text
-from cspr_jax.config.motions.hints import unit_hints
-from cspr_jax.config.motions.table import MotionTable
+from cspr_jax.config.motions.table import MotionTable, unit_hints
 from cspr_jax.errors import ConfigError, InputError
 
 PLAIN = "t,x,y,z\n0,1,2,3\n1,2,3,4\n"

@@ -5,7 +5,7 @@ import pytest
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, CsprError
-from cspr_jax.runtime.surroundings import shortage
+from cspr_jax.runtime.process_environment import shortage
 
 LINE = {"kind": "line", "points": [[0.0, 0.0, 1.0], [0.1, 0.0, 1.0]]}
 CIRCLE = {"centre": [0.0, 0.0, 2.0], "radius": 0.2}

@@ -137,7 +137,7 @@ def test_numbers_are_shown_as_typed():
     assert line.startswith("robot.base_points = [[0.0, 1.0, 3.0], ") and line.endswith("not on one line")
     assert robot_file.typed(InputError("gravity", -1.0, "> 0")) == "robot.gravity = -1.0: must be > 0"
     assert (
-        robot_file.typed(InputError("base_points", 0, "must be so", fault="is so"))
+        robot_file.typed(InputError("base_points", 0, "must be so", problem="is so"))
         == "robot.base_points: is so: must be so"
     )
 

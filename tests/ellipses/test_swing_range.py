@@ -265,7 +265,7 @@ def test_one_line_says_what_is_wrong(tmp_path, changes, words):
 def test_numbers_that_contradict_each_other_are_noticed(tmp_path):
     (tmp_path / "s.toml").write_text(text())
     sweep = read_sweep(tmp_path / "s.toml")
-    own = SwingRangeMap(sweep.robot, sweep.keys, sweep.file)
+    own = SwingRangeMap(sweep.robot, sweep.spec, sweep.file)
     names = ("release_speed", "flight_time", "swing_amplitude", "release_x", "release_y", "release_z")
     answers = {name: np.full(4, 1.0) for name in (*names, "largest_margin")} | {"verdict": np.array([0, 0, 0, 1])}
     answers["largest_margin"][1], answers["flight_time"][2] = -0.1, np.nan

@@ -140,7 +140,7 @@ def test_sweeps_of_the_documents_are_read(checkout):
         path = checkout / "shown.toml"
         path.write_text(text, "utf-8")
         if "map" in read_toml(path):
-            assert read_sweep(path).grid.size > 0
+            assert read_sweep(path).grid.n_cells > 0
 
 
 @pytest.mark.thorough
@@ -179,7 +179,7 @@ def test_files_in_sweeps_are_read():
         if {"pose", "path"} & set(read_toml(path)):
             assert len(checked(PlanFile, read_toml(path), path).pose) > 1
         else:
-            assert read_sweep(path).grid.size > 0
+            assert read_sweep(path).grid.n_cells > 0
 
 
 @pytest.mark.prose

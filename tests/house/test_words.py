@@ -32,9 +32,10 @@ PUBLIC = {
     "config/keys/obstacles.py": {"size"},
     "config/keys/trajectory.py": {"beat"},
     "config/plan.py": {"least", "stretch"},
+    "outputs/plots/style/style.py": {"size"},
     "outputs/volumes.py": {"least", "most"},
     "schema/families.py": {"keys"},
-    "schema/map_kinds.py": {"needs", "stored"},
+    "schema/map_kinds.py": {"keys", "needs", "stored"},
 }
 # How many there are still: to be lowered by who removes some, and never to be raised.
 ALLOWED = {"names": 7, "docstrings": 0, "comments": 0}

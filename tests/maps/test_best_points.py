@@ -79,7 +79,7 @@ def test_every_cell_has_its_best_point(tmp_path):
         for name in set(data) - {"verdict"}:
             np.testing.assert_equal(found.data[name][i, j, k], data[name][i, place, j, k])
         np.testing.assert_equal(found.data["best_z0"][i, j, k], DEPTHS[place] if feasible else np.nan)
-        assert found.place((i, j, k)) == {"x": i, "y": j, "z": k, "z0": DEPTHS[place]}
+        assert found.coordinates((i, j, k)) == {"x": i, "y": j, "z": k, "z0": DEPTHS[place]}
     assert len(kinds) == 4  # feasible surely with the fewest arcs and not, undecided, none
 
 
@@ -91,7 +91,7 @@ def test_several_axes_are_one_choice(tmp_path):
         np.testing.assert_array_equal(both[0].data[name], both[1].data[name])
     for found in both:
         for index in np.ndindex(4, 5):
-            place = found.place(index)
+            place = found.coordinates(index)
             where = index[0], int(np.argmax(place["z0"] == DEPTHS)), index[1], int(place["z"])
             assert all(
                 np.array_equal(found.data[name][index], data[name][where], equal_nan=True)

@@ -9,7 +9,7 @@ from cspr_jax.numerics.bounds.value_and_derivatives import Bounds
 from cspr_jax.numerics.elementary import polynomial, sincospi
 from cspr_jax.numerics.linear.lanes import smallest_of_each
 
-# As users' kernels are compiled, and as `compile_options.least` has them: there sums and products are rounded apart.
+# As users' kernels are compiled, and with `compile_options.proof_options`: there sums and products are rounded apart.
 SINCOSPI, APART = (jax.jit(sincospi, compiler_options={"xla_backend_optimization_level": i}) for i in (1, 0))
 PI = np.longdouble("3.14159265358979323846264338327950288")
 

@@ -6,8 +6,8 @@ import pytest
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.pages.motions import motion_content
-from cspr_jax.outputs.plots.pages.packing import unpacked
-from cspr_jax.outputs.plots.robots.cable_paths import ON_ARC, cable_ways
+from cspr_jax.outputs.plots.pages.page import unpacked
+from cspr_jax.outputs.plots.robots.robot_at import ON_ARC, cable_points
 from cspr_jax.robots.model.pulleys import exits
 
 BASE = [[2.0, 0.0, 3.0], [-1.0, 2.0, 3.0], [-1.0, -2.0, 3.0]]
@@ -22,7 +22,7 @@ def robot(**keys) -> RobotFile:
 def test_ways_are_those_of_the_kernels(axes):
     places = np.random.default_rng(0).uniform([-1.0, -1.0, 0.0], [1.0, 1.0, 2.0], (50, 1, 3))
     attached = np.broadcast_to(places, (50, 3, 3))
-    ways = cable_ways(robot(pulley_radius=RADII, pulley_axes=axes), attached)
+    ways = cable_points(robot(pulley_radius=RADII, pulley_axes=axes), attached)
     assert ways.shape == (50, 3, ON_ARC + 1, 3)
     units = np.broadcast_to([0.0, 0.0, 1.0] if axes is None else axes, (3, 3))
     units = units / np.linalg.norm(units, axis=1, keepdims=True)
@@ -42,8 +42,8 @@ def test_ways_are_those_of_the_kernels(axes):
 
 def test_cables_without_pulleys_are_straight():
     attached = np.zeros((4, 3, 3))
-    np.testing.assert_array_equal(cable_ways(robot(), attached)[:, :, 0], np.broadcast_to(BASE, (4, 3, 3)))
-    assert cable_ways(robot(), attached).shape == (4, 3, 2, 3)
+    np.testing.assert_array_equal(cable_points(robot(), attached)[:, :, 0], np.broadcast_to(BASE, (4, 3, 3)))
+    assert cable_points(robot(), attached).shape == (4, 3, 2, 3)
 
 
 def test_pages_have_the_arcs():
@@ -51,7 +51,7 @@ def test_pages_have_the_arcs():
     columns |= {"tension": np.ones((5, 3))}
     file = robot(pulley_radius=RADII)
     page = motion_content("motion", columns, {}, file, None)
-    ways = cable_ways(file, np.repeat(columns["position"][:, None], 3, axis=1))
+    ways = cable_points(file, np.repeat(columns["position"][:, None], 3, axis=1))
     assert page["onArc"] == ON_ARC - 1
     np.testing.assert_allclose(unpacked(page["arcs"]).reshape(5, 3, -1, 3), ways[:, :, 1:-1], rtol=1e-6)
     assert motion_content("motion", columns, {}, robot(), None)["onArc"] == 0

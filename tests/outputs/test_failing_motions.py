@@ -12,13 +12,12 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial import ConvexHull
 
 import cspr_jax
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.motion_files import failures
 from cspr_jax.outputs.plots.films import film as films
-from cspr_jax.outputs.plots.robots.bodies_in_space import lines_on
-from cspr_jax.outputs.plots.robots.obstacles import COLOUR, points_of
+from cspr_jax.outputs.plots.robots.obstacles import COLOUR, lines_on, points_of
 from cspr_jax.outputs.plots.robots.robot_along import moving
 from cspr_jax.outputs.plots.style.style import Style, in_style
 from cspr_jax.robots.model import shapes
@@ -223,7 +222,7 @@ def test_pages_of_plans_and_of_their_files_have_both(plan, file, tmp_path):
 def test_a_platform_has_its_shape(shape):
     """From its mass centre, whose position a motion holds."""
     robot_file = resolve_robot("cogiro", "", None)
-    keys = plan_keys({"schema": 1, "robot": "cogiro", "pose": [{"rest": True}, {"rest": True}]} | shape, "plan")
+    keys = checked_plan({"schema": 1, "robot": "cogiro", "pose": [{"rest": True}, {"rest": True}]} | shape, "plan")
     turn = np.array([[0.6, 0.0, 0.0, 0.8]])
     columns = {"position": np.array([[1.0, 2.0, 3.0]]), "quaternion": turn}
     corners = moving(columns, robot_file, np.arange(1), keys).corners[0]

@@ -128,7 +128,7 @@ def test_other_kinds_of_films(plan, tmp_path):
 
 @pytest.mark.thorough
 def test_long_films_have_fewer_pictures(plan, monkeypatch):
-    monkeypatch.setattr(films, "MOST", 7)
+    monkeypatch.setattr(films, "LARGEST_COUNT", 7)
     columns = plan.rows(200.0)
     with in_style(Style()):
         data = films.film(".gif", "film", columns, plan.robot_file, plan.keys, speed=2.0)

@@ -15,7 +15,7 @@ from cspr_jax import __version__
 from cspr_jax.cli import main
 from cspr_jax.outputs import motion_files
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.files.checksum import sealed
+from cspr_jax.store.files.checksum import with_trailer
 from cspr_jax.store.files.netcdf import LAYOUT
 from outputs.test_outputs import panels
 
@@ -116,7 +116,7 @@ def test_motions_of_the_version_before(motions, tmp_path, figures, capsys):
         for name in new:
             if not name.startswith("segment"):
                 old[name] = new[name][...]
-    path.write_bytes(sealed(path.read_bytes()))
+    path.write_bytes(with_trailer(path.read_bytes()))
     assert main(["plot", str(path)]) == 0 and len(panels(figures[0])) == 3
     assert main(["verify", str(path)]) == 0
     assert capsys.readouterr().out.endswith("old.h5: rows 800\n")

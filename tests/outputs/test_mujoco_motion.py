@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax.families.platforms.platform_segment import duration
 from cspr_jax.outputs.mujoco.mjcf import model_xml
 from cspr_jax.outputs.mujoco.motion import Played, Suspended, in_world, played, suspended, upward
-from cspr_jax.outputs.mujoco.replay import ends_of_steps, tension_deviation, way_of
+from cspr_jax.outputs.mujoco.replay import ends_of_steps, path_of, tension_deviation
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -110,7 +110,7 @@ def test_the_tensions_make_the_motion_in_mujoco(scene):
     """Open loop over the whole motion; what is left is the integrator's error, which falls with h to the fourth."""
     errors = []
     for moved in (scene.coarse, scene.fine):
-        way = way_of(scene.body, moved, by_segment=False)
+        way = path_of(scene.body, moved, by_segment=False)
         planned = moved.position[ends_of_steps(moved)]
         errors.append([np.linalg.norm(way.position - planned, axis=1).max(), way.rotated.max()])
     coarse, fine = np.array(errors)

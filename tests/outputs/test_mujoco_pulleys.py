@@ -14,7 +14,7 @@ import cspr_jax
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.mujoco.mjcf import LEAD, model_xml
 from cspr_jax.outputs.mujoco.motion import Suspended, attachments, coordinates, in_world, upward
-from cspr_jax.outputs.mujoco.replay import ends_of_steps, tension_deviation, way_of
+from cspr_jax.outputs.mujoco.replay import ends_of_steps, path_of, tension_deviation
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -85,11 +85,11 @@ def test_mujoco_has_the_same_cables_over_pulleys(pattern, name):
         np.testing.assert_allclose(data.ten_length[: model.nu], wanted, atol=1e-11)
         np.testing.assert_allclose(data.ten_length[model.nu :: 2], data.ten_length[model.nu + 1 :: 2], atol=1e-13)
     assert np.abs(tension_deviation(body, moved)).max() < 1e-8 * np.abs(moved.tension).max()
-    found = way_of(body, moved, step, by_segment=True)
+    found = path_of(body, moved, step, by_segment=True)
     off = np.linalg.norm(found.position - moved.position[ends_of_steps(moved)], axis=1)
     assert np.isfinite(off).all() and off.max() < 1e-7
     # The same tensions without pulleys take it elsewhere.
-    astray = way_of(body._replace(pulleys=None), moved, step, by_segment=True)
+    astray = path_of(body._replace(pulleys=None), moved, step, by_segment=True)
     assert np.linalg.norm(astray.position - moved.position[ends_of_steps(moved)], axis=1).max() > 100.0 * off.max()
 
 

@@ -17,14 +17,12 @@ from support.browsers import opened, shown, started
 
 import cspr_jax
 from cspr_jax.cli import main
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots.pages.informative import telling
-from cspr_jax.outputs.plots.pages.maps import map_content, order_of
+from cspr_jax.outputs.plots.pages.maps import informative_cells, map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import motion_content
-from cspr_jax.outputs.plots.pages.packing import packed, unpacked
-from cspr_jax.outputs.plots.pages.page import page_of
+from cspr_jax.outputs.plots.pages.page import packed, page_of, unpacked
 
 SWEEP = {
     "schema": 1,
@@ -132,7 +130,7 @@ def test_a_platform_s_points_turn_with_it():
     position = rng.uniform(-1.0, 1.0, (count, 3))
     columns = {"t": np.arange(count) / 8.0, "position": position, "quaternion": quaternion}
     columns["tension"] = rng.uniform(size=(count, 6))
-    keys = plan_keys({"schema": 1, "robot": "laval-mssm", "pose": [{"rest": True}, {"rest": True}]}, "plan")
+    keys = checked_plan({"schema": 1, "robot": "laval-mssm", "pose": [{"rest": True}, {"rest": True}]}, "plan")
     found = motion_content("motion", columns, {}, robot_file, keys)
     attached = unpacked(found["attached"]).reshape(count, 6, 3)
     own = np.array(robot_file.platform_points)
@@ -157,11 +155,11 @@ def test_telling_cells_are_feasible_and_differ():
     verdict = rng.integers(0, 2, (7, 5, 3)).astype(np.uint32)
     data = {"arcs": rng.integers(1, 5, verdict.shape), "margin": rng.uniform(size=verdict.shape)}
     for count in (0, 1, 12, 1000):
-        cells = telling(data, verdict, count)
+        cells = informative_cells(data, verdict, count)
         assert len(cells) == len(set(cells)) == min(count, int((verdict == 0).sum()))
         assert all(verdict[cell] == 0 for cell in cells)
     least = np.where(verdict == 0, data["margin"], np.inf)
-    assert np.unravel_index(np.argmin(least), verdict.shape) in telling(data, verdict, 12)
+    assert np.unravel_index(np.argmin(least), verdict.shape) in informative_cells(data, verdict, 12)
 
 
 def test_a_large_map_is_a_page_below_twenty_megabytes(result):
@@ -426,7 +424,7 @@ def test_a_workspace_in_a_browser(folder):
 
 
 def test_a_page_says_robot_limits_and_duration(folder):
-    keys = plan_keys(PLAN | {"tension_max": 9.0, "cable_speed_max": 40.0, "floor": 3.0}, "plan")
+    keys = checked_plan(PLAN | {"tension_max": 9.0, "cable_speed_max": 40.0, "floor": 3.0}, "plan")
     robot_file = resolve_robot("prototype", "", Path())
     rows = {name: np.zeros((3, width)) for name, width in {"position": 3, "length": 3, "rate": 3, "tension": 3}.items()}
     motion = motion_content("motion", {"t": np.array([0.0, 1.0, 2.5])} | rows, {}, robot_file, keys)

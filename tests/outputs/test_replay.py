@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import played, suspended
-from cspr_jax.outputs.mujoco.replay import tension_deviation, way_of
+from cspr_jax.outputs.mujoco.replay import path_of, tension_deviation
 from outputs.test_outputs import cspr, strict_json
 
 mujoco = pytest.importorskip("mujoco")
@@ -104,7 +104,7 @@ def test_another_robot_is_seen(folder):
         assert np.abs(found).max() == pytest.approx(0.001 * moved.tension.max(), rel=1e-3)
         shifted = body._replace(spools=body.spools + 0.001 * np.eye(3)[:, :1] * np.eye(3)[0])
         assert np.abs(tension_deviation(shifted, moved)).max() > 1e-4
-        way = way_of(shifted, moved, by_segment=False)
+        way = path_of(shifted, moved, by_segment=False)
         assert np.linalg.norm(way.position[-1] - moved.position[-1]) > 1e-4
 
 

@@ -33,7 +33,7 @@ def test_robots_to_begin_with(tmp_path):
 def test_sweeps_to_begin_with(tmp_path):
     for kind, row in MAP_KINDS.items():
         path = new_file("sweep", tmp_path / f"{kind}.toml", map=kind)
-        assert read_sweep(path).grid.size > 0, kind
+        assert read_sweep(path).grid.n_cells > 0, kind
         text = path.read_text("utf-8")
         assert tomllib.loads(text)["map"] == kind
         heads = {line.strip("# []").partition("]")[0] for line in text.splitlines() if "[" in line}

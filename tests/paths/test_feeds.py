@@ -10,7 +10,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
-from cspr_jax.outputs.path_lines import path_lines
+from cspr_jax.outputs.paths import path_lines
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.verification.feeds import feed_proof
 from cspr_jax.verification.proved_answers import proved_answers

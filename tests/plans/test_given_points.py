@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import cspr_jax
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.limits import lowest_depth
@@ -39,7 +39,7 @@ def test_poses_of_the_origin_are_those_of_the_mass_centre(z_axis):
     place = [0.1, 0.05, sign * 1.2]
     poses = [{"position": place}, {"position": place, "quaternion": QUATERNION.tolist()}, {"rest": True}]
     data = {"schema": 1, "family": "spline", "point": "origin", "robot": ROBOT, "pose": poses}
-    keys = plan_keys(data, PLAN)
+    keys = checked_plan(data, PLAN)
     robot_file = resolve_robot(ROBOT | {"z_axis": z_axis}, PLAN, Path())
     level, rotated, rest = with_mass_centres(robot_file, keys, PLAN).pose
     arm = np.array(level.position) - place
@@ -47,13 +47,13 @@ def test_poses_of_the_origin_are_those_of_the_mass_centre(z_axis):
     expected = Rotation.from_quat(np.roll(QUATERNION, -1)).apply(arm)
     np.testing.assert_allclose(np.array(rotated.position) - place, expected, atol=1e-12)
     for point in ("mass-centre", None):
-        same = plan_keys(data | {"point": point}, PLAN)
+        same = checked_plan(data | {"point": point}, PLAN)
         assert with_mass_centres(robot_file, same, PLAN).pose == same.pose
 
 
 def test_what_is_always_of_the_mass_centre_is_refused():
     poses = [{"position": [0.0, 0.0, 1.2]}, {"position": [0.1, 0.0, 1.2], "velocity": [0.1, 0.0, 0.0]}]
-    keys = plan_keys({"schema": 1, "family": "spline", "point": "origin", "robot": ROBOT, "pose": poses}, PLAN)
+    keys = checked_plan({"schema": 1, "family": "spline", "point": "origin", "robot": ROBOT, "pose": poses}, PLAN)
     with pytest.raises(ConfigError, match=r'point = "origin": must be "mass-centre" with pose\[1\]\.velocity'):
         with_mass_centres(resolve_robot(ROBOT, PLAN, Path()), keys, PLAN)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.build.surroundings import build_scene, surroundings
+from cspr_jax.build.scenes import build_scene, robot_scene
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
@@ -62,7 +62,7 @@ def test_shapes_turn_with_the_axes_of_a_platform():
     moved, rotation = aligned(robot)
     assert np.abs(rotation - np.eye(3)).max() > 0.1
     body = hull(np.vstack([points, [0.0, 0.0, 0.2]]))
-    scene = surroundings(moved, frame, (), body, rotation)
+    scene = robot_scene(moved, frame, (), body, rotation)
     assert is_within(scene.body, scene.platform_points).all()
 
 

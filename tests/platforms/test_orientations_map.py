@@ -10,7 +10,7 @@ from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
 from cspr_jax.families.platforms.orientations.accessible import accessible
 from cspr_jax.families.platforms.orientations.attainable import attainable
-from cspr_jax.outputs.plots.style.verdict_colours import reasons
+from cspr_jax.outputs.plots.style.word_ticks import reasons
 from cspr_jax.published import chapter_3
 from cspr_jax.published.table_3_4 import smallest_proportions
 from cspr_jax.schema.verdicts import Verdict
@@ -23,7 +23,7 @@ NEAR = ("x = 1.5b", "y = 1.5b")
 def test_tables_of_orientations(monkeypatch):
     """Cells of two places, with a coarse step and few arcs; options that do not belong are refused."""
     monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)
-    monkeypatch.setattr(chapter_3, "PLACES", {name: chapter_3.PLACES[name] for name in NEAR})
+    monkeypatch.setattr(chapter_3, "PLACES", {name: chapter_3.POSITIONS[name] for name in NEAR})
     check_tables(monkeypatch)
     code, _, err = cspr("table", "2.1", "--fine")
     assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
@@ -41,7 +41,7 @@ def check_tables(monkeypatch):
     code, out, err = cspr("table", "3.3", "--json", "--definition", "grid")
     assert code == 0, err
     cells = json.loads(out)["cells"]
-    assert len(cells) == 8 * len(chapter_3.PLACES) and {c["variant"]["definition"] for c in cells} == {"grid"}
+    assert len(cells) == 8 * len(chapter_3.POSITIONS) and {c["variant"]["definition"] for c in cells} == {"grid"}
     by = {(c["row"], c["column"]): c for c in cells}
     for row in NEAR:
         fraction = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.schema.identity import digest
+from cspr_jax.store.documents import read_record
 from cspr_jax.store.files.disk import Disk
-from cspr_jax.store.record import read_record
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep, read_sweep
-from cspr_jax.sweep.engine import Hooks, Options, Outcome, Run
+from cspr_jax.sweep.engine import Hooks, Options, Run, RunSummary
 from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.work import Computed
 
@@ -51,7 +51,7 @@ def values_of(sweep: Sweep, index: int) -> dict[str, np.ndarray]:
     """What a tile holds: numbers that follow from its index and the sweep."""
     rng = np.random.default_rng([index, int(sweep.identity[:8], 16)])
     shape = sweep.grid.tiling.extent(index)
-    kind = sweep.keys.run.dtype
+    kind = sweep.spec.run.dtype
     found = {
         "arcs": rng.integers(0, 30, shape).astype(np.int16),
         "verdict": rng.integers(0, 500, shape).astype(np.uint32),
@@ -86,13 +86,13 @@ class Paper:
 
 def go(
     sweep: Sweep, directory: Path, *, disk: Disk | None = None, paper: Paper | None = None, **options: bool
-) -> Outcome:
+) -> RunSummary:
     """Run to the end, as the command line does; raises what a run raises."""
     acknowledged: list[int] = []
     run = Run(sweep, directory, Options(**options), Hooks(on_tile=lambda done, total: acknowledged.append(done)), disk)
     path = run.finished()
     if path is not None:
-        return Outcome(path, 0, len(sweep.grid.tiling))
+        return RunSummary(path, 0, len(sweep.grid.tiling))
     return run.go(paper or Paper(sweep))
 
 

@@ -56,7 +56,7 @@ def test_a_folder_full_of_modules(hostile, tmp_path, monkeypatch):
     folder, marks = hostile
     with monkeypatch.context() as patch:
         patch.chdir(folder)
-        assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and not marks.exists()
+        assert not xla._is_accepted(tmp_path, "--xla_no_such_flag=1") and not marks.exists()
     run_there(hostile, tmp_path, [2.0], os.environ)
 
 

@@ -216,7 +216,7 @@ def test_the_result_is_labelled_for_others(tmp_path):
 
 
 def test_provenance_is_in_the_record(tmp_path):
-    from cspr_jax.store.record import read_record
+    from cspr_jax.store.documents import read_record
 
     sweep = sweep_of(tmp_path, tiles=4)
     go(sweep, tmp_path / "run")

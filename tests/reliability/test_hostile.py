@@ -13,14 +13,13 @@ from hypothesis import strategies as st
 from support.commands import cspr
 from support.reading import read_here
 
-from cspr_jax.build.limits import build_limits
 from cspr_jax.build.problems import build_amplitude
-from cspr_jax.build.robots import build_robot
+from cspr_jax.build.robots import build_limits, build_robot
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import CsprError
-from cspr_jax.store.files.checksum import sealed
+from cspr_jax.store.files.checksum import with_trailer
 from cspr_jax.sweep.definition import read_sweep
 from reliability.support import SWEEP, content, go, sweep_of
 
@@ -131,7 +130,7 @@ def test_foreign_hdf5(finished, tmp_path, monkeypatch):
         with h5py.File(path, "w") as file:
             fill(file)
         refused("plot", path)  # it was not written by this program
-        path.write_bytes(sealed(path.read_bytes()))  # and if it had been
+        path.write_bytes(with_trailer(path.read_bytes()))  # and if it had been
         refused("plot", path)
         refused("verify", path)
         directory = tmp_path / "run"

@@ -21,7 +21,7 @@ from cspr_jax.outputs.plots.draw import _map_figure
 from cspr_jax.outputs.plots.motions.motion import motion_figure
 from cspr_jax.schema.identity import identity
 from cspr_jax.store.consolidation import content_of
-from cspr_jax.store.files.checksum import LENGTH, DamagedError, seal_file, sealed
+from cspr_jax.store.files.checksum import LENGTH, DamagedError, with_trailer, write_trailer
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.netcdf import LAYOUT, make_datasets, set_attributes
 from cspr_jax.store.reading import isolated
@@ -64,7 +64,7 @@ def forged(path, fill, layout=LAYOUT):
 
 def seal(path):
     with open(path, "r+b") as file:
-        seal_file(Disk(), file.fileno(), os.fstat(file.fileno()).st_size)
+        write_trailer(Disk(), file.fileno(), os.fstat(file.fileno()).st_size)
 
 
 def changed(*keys, to):
@@ -365,7 +365,7 @@ def mutate(folder, count):
 
     def one(i):
         path = folder / f"{i}.h5"
-        path.write_bytes(sealed(mutated(np.random.default_rng([17, i]), good[i % 4])))
+        path.write_bytes(with_trailer(mutated(np.random.default_rng([17, i]), good[i % 4])))
         try:
             result = cspr_jax.open_result(path)
         except StoreError as error:

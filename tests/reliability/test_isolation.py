@@ -18,7 +18,7 @@ from support.commands import cspr
 
 from cspr_jax.errors import StoreError
 from cspr_jax.schema.identity import canonical_json, digest
-from cspr_jax.store.files.checksum import LENGTH, sealed
+from cspr_jax.store.files.checksum import LENGTH, with_trailer
 from cspr_jax.store.files.netcdf import LAYOUT
 from cspr_jax.store.reading import isolated
 from cspr_jax.sweep.inspection import verify
@@ -47,7 +47,7 @@ def spoiled_runs(folder, tiles):
         spoiled = mutated(np.random.default_rng([23, index]), path.read_bytes()[:-LENGTH])
         # One letter of the environment's hash makes it a good shard of another environment, which a run refuses.
         if computed_by in spoiled:
-            path.write_bytes(sealed(spoiled))
+            path.write_bytes(with_trailer(spoiled))
     found = verify(directory)
     assert found["shards"] + len(found["faults"]) == tiles and not found["unreadable"]
     paper = Paper(sweep)
@@ -158,7 +158,7 @@ def test_headers_of_any_type(finished, tmp_path, step):
         forged.write_bytes(good[:-LENGTH])
         with h5py.File(forged, "r+", libver=LAYOUT) as file:
             file.attrs["header"] = header
-        path.write_bytes(sealed(forged.read_bytes()))
+        path.write_bytes(with_trailer(forged.read_bytes()))
         faults = verify(directory)["faults"]
         harmless = name == "no undecided"
         assert len(faults) == (not harmless) and all(len(line.splitlines()) == 1 for line in faults), name
@@ -197,7 +197,7 @@ def test_hostile_shards(finished, tmp_path, change):
     path.write_bytes(path.read_bytes()[:-LENGTH])
     with h5py.File(path, "r+", libver=LAYOUT) as file:
         change(file)
-    path.write_bytes(sealed(path.read_bytes()))
+    path.write_bytes(with_trailer(path.read_bytes()))
     assert len(verify(directory)["faults"]) == 1
     (directory / "small.h5").unlink()
     go(sweep, directory)
@@ -240,6 +240,6 @@ def test_each_library_of_the_process_may_lie_in_a_folder_of_its_own():
     }
     at_start = {name for name in needed if name.startswith("_")}  # of installers
     assert needed - at_start - {"cspr_jax"} == set(isolated._LIBRARIES)
-    places = isolated._places()
+    places = isolated._library_folders()
     assert set(places) <= set(sys.path)
     assert all(PathFinder.find_spec(name, places) is not None for name in isolated._LIBRARIES)

@@ -10,7 +10,7 @@ from hypothesis import strategies as some
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.batches import in_threads
 from cspr_jax.numerics.cores import VARIABLE, cores
-from cspr_jax.runtime.processes import MOST, Spread, balanced, check_count, usual_count
+from cspr_jax.runtime.processes import LARGEST_USUAL, Spread, balanced, check_count, usual_count
 
 
 def shares(items):
@@ -64,7 +64,7 @@ def test_usual_counts(monkeypatch):
     monkeypatch.setenv(VARIABLE, "3")
     assert [usual_count(parts) for parts in (0, 1, 2, 3, 4, 100)] == [1, 1, 2, 3, 3, 3]
     monkeypatch.setenv(VARIABLE, "1000")
-    assert usual_count(10_000) == MOST
+    assert usual_count(10_000) == LARGEST_USUAL
 
 
 @pytest.mark.parametrize("given", ["", "0", "-2", "two", "1.5"])

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from cspr_jax.errors import StoppedError
-from cspr_jax.runtime.progress import Pace
+from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.sweep import inspection
@@ -50,7 +50,7 @@ def test_status_and_the_log_have_one_estimate(tmp_path, monkeypatch):
     """That of the process: the first tile, which compiles, counts until there is another."""
     sweep, directory, clock = sweep_of(tmp_path), tmp_path / "run", [1e9]
     monkeypatch.setattr(time, "time", lambda: clock[0])
-    pace, rates = Pace(lambda: clock[0]), []
+    pace, rates = RateEstimate(lambda: clock[0]), []
 
     class Slow(Paper):
         def tiles(self, indices, stop):

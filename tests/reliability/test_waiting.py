@@ -20,7 +20,7 @@ from cspr_jax.errors import StoreError
 from cspr_jax.published import tables
 from cspr_jax.runtime import progress as progress_lines
 from cspr_jax.runtime import stages
-from cspr_jax.runtime.progress import Pace, progress, waiting
+from cspr_jax.runtime.progress import RateEstimate, progress, waiting
 from reliability.support import go, sweep_of
 
 # In a call that no signal ends, as compiling is: the main thread waits for a lock that it holds itself.
@@ -203,7 +203,7 @@ def test_a_log_gets_a_line_now_and_then(monkeypatch):
 def test_the_pace_of_a_sweep():
     """Cells that an earlier run has left count for nothing, nor does compiling once there are two tiles."""
     now = [100.0]
-    pace = Pace(lambda: now[0])
+    pace = RateEstimate(lambda: now[0])
     pace.advance(500, 1000)
     assert pace.rate is None and pace.left() == ""
     now[0] = 110.0

@@ -14,7 +14,7 @@ from support.commands import cspr, plan, planned
 from support.pairs import LAUNCH_BASE, LAUNCH_PLATFORM, made, random_pairs
 
 import cspr_jax
-from cspr_jax.build.limits import build_limits
+from cspr_jax.build.robots import build_limits
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.equivalents import as_moved, no_equivalent
 from cspr_jax.config.keys.limits import LimitTable

@@ -12,7 +12,7 @@ from oracles import platform as oracle
 from oracles.pulleys import length
 
 import cspr_jax
-from cspr_jax.build.robots import fault_at_rest
+from cspr_jax.build.robots import error_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
@@ -164,7 +164,7 @@ def test_any_pattern_is_loaded_from_a_file(tmp_path, pattern):
         pair = np.asarray(MATRIX(loaded, at)), np.asarray(MATRIX(own, moved))
     np.testing.assert_allclose(np.abs(pair[0]), np.abs(pair[1]), atol=1e-12)
     if pattern not in ("2T", "3T", "3R3T"):
-        assert "not known" not in (fault_at_rest(read_robot(path)) or "")
+        assert "not known" not in (error_at_rest(read_robot(path)) or "")
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
 import cspr_jax
-from cspr_jax.build.robots import fault_at_rest
+from cspr_jax.build.robots import error_at_rest
 from cspr_jax.cli import main
-from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
+from cspr_jax.config.catalogue import CATALOGUE, REST_ERRORS, catalogue_names
 from cspr_jax.config.keys.limits import LimitKeys, LimitTable
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, read_robot
@@ -229,7 +229,7 @@ def test_files_of_any_number_of_cables_load(tmp_path, name):
     np.testing.assert_array_equal(robot.base_points, points)
     np.testing.assert_array_equal(robot.limits.tension_min, each)
     np.testing.assert_array_equal(robot.limits.tension_max, [90.0] * len(points))
-    assert "not known" not in (fault_at_rest(read_robot(path)) or "")
+    assert "not known" not in (error_at_rest(read_robot(path)) or "")
     at, is_platform = state(robot, RNG), pattern == "3R3T"
     own = centred(robot)[0]
     assert jax.eval_shape(own.wrench_matrix, at).shape == (robot.dof, len(points))
@@ -289,4 +289,4 @@ def test_slacks_of_limits_have_the_sign_of_the_limit(name):
 @pytest.mark.parametrize("name", catalogue_names())
 def test_the_list_of_the_catalogue_knows_who_cannot_hang_taut(name):
     """It is stored, since the list is to answer at once."""
-    assert fault_at_rest(read_robot(CATALOGUE / f"{name}.toml")) == FAULTS.get(name)
+    assert error_at_rest(read_robot(CATALOGUE / f"{name}.toml")) == REST_ERRORS.get(name)

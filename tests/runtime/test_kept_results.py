@@ -5,9 +5,9 @@ import zlib
 
 import pytest
 
-from cspr_jax.runtime import kept_results
+from cspr_jax.published import tables
+from cspr_jax.published.tables import kept_result
 from cspr_jax.runtime.compile_cache import PROGRAMS
-from cspr_jax.runtime.kept_results import kept_result
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_a_result_is_computed_once_for_the_same_sources_and_settings(folder, mon
     assert kept_result("table", {"n": 2}, compute) != first and asked == [0, 1]
     assert kept_result("table", {"n": 1}, compute, again=True) == [["a", 0.1, None, 2]]
     assert kept_result("table", {"n": 1}, compute) == [["a", 0.1, None, 2]] and len(asked) == 3
-    monkeypatch.setattr(kept_results, "_sources", lambda: "others")
+    monkeypatch.setattr(tables, "checksum_of_sources", lambda endings: "others")
     assert kept_result("table", {"n": 1}, compute) == [["a", 0.1, None, 3]]
     monkeypatch.delenv(PROGRAMS)
     assert kept_result("table", {"n": 1}, compute) == [["a", 0.1, None, 4]]

@@ -97,7 +97,7 @@ def test_what_decides_a_program_is_part_of_its_key(folder, monkeypatch):
     again(TAU, power=2)
     assert not traces
     for change in (
-        lambda: monkeypatch.setattr(programs, "_sources", lambda: "others"),
+        lambda: monkeypatch.setattr(programs, "checksum_of_sources", lambda: "others"),
         lambda: monkeypatch.setattr(programs, "_versions", lambda: ("other", "versions")),
         lambda: jax.config.update("jax_numpy_rank_promotion", "warn"),
     ):
@@ -116,7 +116,7 @@ def test_sources_are_read_by_their_contents(tmp_path, monkeypatch):
     for name, text in (("a.py", "x = 1"), ("a.py", "x = 2"), ("b.py", "x = 2"), ("runtime/c.py", "")):
         (package / name).write_text(text)
         os.utime(package / name, (0, 0))
-        seen.add(programs._sources.__wrapped__())
+        seen.add(programs.checksum_of_sources.__wrapped__())
     assert len(seen) == 4
 
 

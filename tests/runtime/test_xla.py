@@ -59,10 +59,10 @@ print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_
 
 def test_proofs_are_compiled_least_where_little_is_computed(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", " ".join(compile_options.QUICK))
-    assert jax.jit(lambda x: x + 1.0, compiler_options=compile_options.least())(1.0) == 2.0
-    assert compile_options.least() == {"xla_backend_optimization_level": 0}
+    assert jax.jit(lambda x: x + 1.0, compiler_options=compile_options.proof_options())(1.0) == 2.0
+    assert compile_options.proof_options() == {"xla_backend_optimization_level": 0}
     monkeypatch.setenv("XLA_FLAGS", xla.WIDE)
-    assert compile_options.least() is None
+    assert compile_options.proof_options() is None
 
 
 @pytest.mark.thorough
@@ -110,10 +110,12 @@ def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatc
         return whole(*arguments, **keys)
 
     monkeypatch.setattr(subprocess, "run", counted)
-    assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and not xla._is_known(tmp_path, "--xla_no_such_flag=1")
+    assert not xla._is_accepted(tmp_path, "--xla_no_such_flag=1") and not xla._is_accepted(
+        tmp_path, "--xla_no_such_flag=1"
+    )
     assert len(tries) == 1
     (tmp_path / "flags.json").write_text("{ half a rec")
-    assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and len(tries) == 2
+    assert not xla._is_accepted(tmp_path, "--xla_no_such_flag=1") and len(tries) == 2
 
 
 @pytest.mark.thorough
@@ -125,9 +127,9 @@ def test_flags_that_another_xla_knows_do_not_take_ours_with_them(tmp_path, monke
         *(xla.QUICK[0], xla.QUICK[2]),
         "--xla_cpu_use_xnnpack=false",
     ]
-    assert xla.known_flags(tmp_path, []) == []
+    assert xla.accepted_flags(tmp_path, []) == []
     monkeypatch.setattr(xla, "_refusal", lambda folder, flags: None)
-    assert xla.known_flags(tmp_path, xla.QUICK) == []  # nobody knows: each would be asked for as long again
+    assert xla.accepted_flags(tmp_path, xla.QUICK) == []  # nobody knows: each would be asked for as long again
 
 
 def test_the_library_sets_nothing(tmp_path):
@@ -550,7 +552,7 @@ def test_a_record_of_flags_that_is_none(tmp_path, record, monkeypatch):
     else:
         path.write_text({"deep": "[" * 50_000, "large": " " * 100_000 + "{}", "list": "[1]"}[record])
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: types.SimpleNamespace(returncode=0))
-    assert xla._is_known(tmp_path, "--xla_flag=1") and json.loads(path.read_text()) == {"--xla_flag=1": True}
+    assert xla._is_accepted(tmp_path, "--xla_flag=1") and json.loads(path.read_text()) == {"--xla_flag=1": True}
 
 
 @pytest.mark.parametrize("which", ["CSPR_CACHE_DIR", "key", "whole"])

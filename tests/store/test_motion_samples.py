@@ -52,7 +52,7 @@ def test_windows_of_this_program(folder):
     whole = read_motion(folder / "motion.csv")
     (window,) = motion_windows(folder / "motion.h5")
     np.testing.assert_array_equal(window.table.times, whole.times)
-    parts = list(motion_windows(folder / "motion.csv", rows=101))
+    parts = list(motion_windows(folder / "motion.csv", n_rows=101))
     cores = [part.table.times[part.first : part.last + 1] for part in parts]
     np.testing.assert_array_equal(np.concatenate([cores[0], *(core[1:] for core in cores[1:])]), whole.times)
 

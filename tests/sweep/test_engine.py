@@ -287,10 +287,10 @@ def test_the_reference_data_set_is_what_the_program_computes():
     assert list(result.axes) == list(sweep.grid.axes)
     for name, points in sweep.grid.axes.items():
         np.testing.assert_array_equal(result.axes[name], points)
-    places = np.random.default_rng(2).choice(sweep.grid.size, 60, replace=False)
+    places = np.random.default_rng(2).choice(sweep.grid.n_cells, 60, replace=False)
     index = np.unravel_index(places, sweep.grid.shape)
     cells = {name: points[i] for (name, points), i in zip(sweep.grid.axes.items(), index, strict=True)}
-    answers = MinimumArcsMap(sweep.robot, sweep.keys, sweep.file)(cells)
+    answers = MinimumArcsMap(sweep.robot, sweep.spec, sweep.file)(cells)
     assert set(sweep.store) == set(result.data) and len(np.unique(answers["arcs"])) > 5
     for name, stored in result.data.items():
         rtol = 1e-6 if name in FLOATS else 0.0

@@ -48,7 +48,7 @@ def test_a_map_with_limits_has_many_tiles():
     assert 2 < len(sweep(**SPEED).grid.tiling) < 20
     limited = sweep(**UNCERTAIN)
     assert 20 <= len(limited.grid.tiling) <= 60
-    seconds = tile_sizes.cell_seconds(limited.kind, limited.keys)
+    seconds = tile_sizes.cell_seconds(limited.kind, limited.spec)
     assert 20.0 <= seconds * math.prod(limited.grid.tile) <= 60.0
     more_arcs = sweep(**UNCERTAIN, trajectory=MAP["trajectory"] | {"max_arcs": 60})
     assert len(more_arcs.grid.tiling) > len(limited.grid.tiling)
@@ -57,8 +57,8 @@ def test_a_map_with_limits_has_many_tiles():
 def test_long_runs_have_a_score_of_tiles_and_short_ones_fewer():
     limited = sweep(**UNCERTAIN)
     for cells in (1, 100, 2_000, 50_000, 10**7):
-        tile = tile_sizes.tile_cells(limited.kind, limited.keys, cells)
-        seconds = tile_sizes.cell_seconds(limited.kind, limited.keys)
+        tile = tile_sizes.tile_cells(limited.kind, limited.spec, cells)
+        seconds = tile_sizes.cell_seconds(limited.kind, limited.spec)
         assert seconds * (tile - 1) <= tile_sizes.TILE_SECONDS
         if cells * seconds > tile_sizes.FEWEST_TILES * tile_sizes.SHORTEST_SECONDS:
             assert cells / tile >= tile_sizes.FEWEST_TILES - 1

@@ -5,7 +5,7 @@ import pytest
 
 from cspr_jax.workspaces.cells.cells import cells_about
 from cspr_jax.workspaces.cells.inside_cells import tension_bounds
-from cspr_jax.workspaces.cells.outside_cells import are_beyond, least_slacks, products_of
+from cspr_jax.workspaces.cells.outside_cells import are_beyond, lower_slacks, products_of
 
 SIZES = [(1, 2), (3, 4), pytest.param(6, 6, marks=pytest.mark.soak), (6, 8)]
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -122,7 +122,7 @@ def test_bounds_of_products_hold_those_of_the_normal_that_moves(components, cabl
         found = products_of(one, normal[None], held[i : i + 1], wrench[None])
         least, most = (side[0] for side in found.ends)
         with np.errstate(invalid="ignore"):
-            slack = least_slacks(one, found, limits[None])[0]
+            slack = lower_slacks(one, found, limits[None])[0]
         if not np.isfinite(slack):
             continue
         known, seen, slacks = known + 1, [], []

@@ -8,7 +8,7 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.outputs.plots.pages.maps import map_content
-from cspr_jax.outputs.plots.style.verdict_colours import reasons
+from cspr_jax.outputs.plots.style.word_ticks import reasons
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.workspaces.static_poses import MARGINS as COLUMNS
 from cspr_jax.workspaces.static_poses import over_orientations

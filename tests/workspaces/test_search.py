@@ -11,10 +11,10 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
-from cspr_jax.build.surroundings import surroundings
+from cspr_jax.build.scenes import robot_scene
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import frame_of
-from cspr_jax.outputs.plots.style.verdict_colours import REASONS
+from cspr_jax.outputs.plots.style.word_ticks import REASONS
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import platform_robot
@@ -144,7 +144,7 @@ def test_cables_that_leave_pulleys_are_kept_apart_from_there():
     places, turns = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.3]]), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
 
     def apart(robot, positions, quaternions):
-        here = surroundings(robot, frame_of(np.zeros((1, 3)), "down"))
+        here = robot_scene(robot, frame_of(np.zeros((1, 3)), "down"))
         return at_rest(robot, here, positions, quaternions).clearance
 
     found = apart(centred(wound)[0], places - base.mean(0), turns)

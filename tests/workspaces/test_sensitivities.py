@@ -229,7 +229,7 @@ def test_sweeps_that_are_refused(tmp_path, robot, y, words):
 def test_numbers_that_contradict_each_other_are_noticed(tmp_path):
     (tmp_path / "s.toml").write_text(SWEEP.format(robot="prototype", y=[0.0], z=0.5, deeper=0.9))
     sweep = read_sweep(tmp_path / "s.toml")
-    known = SensitivityMap(sweep.robot, sweep.keys, sweep.file)
+    known = SensitivityMap(sweep.robot, sweep.spec, sweep.file)
     answers = {"sigma_p": np.array([2.0, 0.5, np.nan, np.inf]), "sigma_r": np.array([1.0, np.nan, -1.0, np.inf])}
     faults = known.contradictions(answers)
     assert [list(cells) for cells in faults.values()] == [[False, True, True, False], [False, False, True, False]]

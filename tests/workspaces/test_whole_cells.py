@@ -73,7 +73,7 @@ class Asked:
 
     def margins(self, inner, half):
         with double_precision():
-            return self.proofs.least_margins(inner, half)
+            return self.proofs.lower_margins(inner, half)
 
 
 def check(asked, rng, count, *, largest=0.3, samples=8, programs=1, depth=0):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.keys.limits import LimitTable
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
-from cspr_jax.config.mappings import plain
+from cspr_jax.config.keys.obstacles import ObstacleKeys
+from cspr_jax.config.reading import plain_values
 from cspr_jax.errors import InputError, demand
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.cables import AnyRobot
@@ -32,7 +32,7 @@ def robot_table(robot: AnyRobot) -> dict[str, Any]:
     if robot.pulleys is not None:
         table |= {"pulley_radius": robot.pulleys.radius, "pulley_axes": robot.pulleys.axes}
     table |= {row.name: getattr(robot.limits, row.name) for row in LIMITS if row.per_cable}
-    return plain(
+    return plain_values(
         {
             key: np.asarray(value) if hasattr(value, "shape") else value
             for key, value in table.items()
@@ -52,14 +52,14 @@ def check_keys(
 
 def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
     if limits is None or isinstance(limits, Mapping):
-        known = [*LimitTable.model_fields, *SurroundingsKeys.model_fields]
+        known = [*LimitTable.model_fields, *ObstacleKeys.model_fields]
         for key in (key for key in limits or {} if key not in known):
             allowed = demand("a key of [limits] of a plan, or of what surrounds the robot")
-            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), known) + allowed, fault="unknown key")
-        return plain(dict(limits or {}))
+            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), known) + allowed, problem="unknown key")
+        return plain_values(dict(limits or {}))
     values = {row.name: getattr(limits, row.name) for row in LIMITS}
     numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}
     if limits.uncertainty is None:
-        return plain(numbers)
+        return plain_values(numbers)
     parts = {row.name: np.asarray(getattr(limits.uncertainty, row.name)) for row in UNCERTAINTIES}
-    return plain({"limits": numbers | {"uncertainty": parts}})
+    return plain_values({"limits": numbers | {"uncertainty": parts}})

@@ -15,7 +15,7 @@ from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.keys.path import GRID, PathTable
-from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.reading import checked as checked_table
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of
@@ -95,7 +95,7 @@ def least_time_paths(
     Raises:
         InputError: points that make no path, or an impossible argument.
     """
-    keys = plan_keys(check_keys(robot, limits), NAME)
+    keys = checked_plan(check_keys(robot, limits), NAME)
     settings = {
         "kind": kind or "cubic",
         "corner": corner,
@@ -105,7 +105,7 @@ def least_time_paths(
     }
     table = checked_table(PathTable, {key: value for key, value in settings.items() if value is not None}, NAME)
     if not len(paths):
-        raise InputError("paths", None, "must hold at least one path", fault="none")
+        raise InputError("paths", None, "must hold at least one path", problem="none")
     with double_precision():
         file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["path"].legs])
         problem = build_problem(file, keys, keys, NAME, any_cables=True)
@@ -141,14 +141,16 @@ def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternion
             units = _numbers(name, quaternions[i] if i < len(quaternions) else [], 4)
             sizes = np.linalg.norm(units, axis=-1, keepdims=True)
             if len(units) != len(places) or not (sizes > 0.0).all():
-                raise InputError(name, None, f"must be {len(places)}, none of them zero", fault=f"{len(units)} of them")
+                raise InputError(
+                    name, None, f"must be {len(places)}, none of them zero", problem=f"{len(units)} of them"
+                )
             units = units / sizes
     elif quaternions is not None:
-        raise InputError("quaternions", None, "must be absent for a point mass", fault="given")
+        raise InputError("quaternions", None, "must be absent for a point mass", problem="given")
     try:
         return course_through(table, places, units).sections()
     except InputError as error:
-        raise InputError(f"paths[{i}], {error.key}", error.value, error.allowed, fault=error.fault) from error
+        raise InputError(f"paths[{i}], {error.key}", error.value, error.allowed, problem=error.problem) from error
 
 
 def _numbers(name: str, values: Any, width: int) -> np.ndarray:
@@ -157,10 +159,10 @@ def _numbers(name: str, values: Any, width: int) -> np.ndarray:
         array = np.asarray(values)
     except ValueError as error:  # of rows of several lengths
         raise InputError(
-            name, None, f"finite numbers of shape (k, {width})", fault="rows of several lengths"
+            name, None, f"finite numbers of shape (k, {width})", problem="rows of several lengths"
         ) from error
     if array.ndim != 2 or array.shape[1] != width or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise InputError(name, None, f"finite numbers of shape (k, {width})", fault=f"shape {array.shape}")
+        raise InputError(name, None, f"finite numbers of shape (k, {width})", problem=f"shape {array.shape}")
     return array.astype(float)
 
 

@@ -87,7 +87,7 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
     if not file.is_file():
         raise ConfigError(file, f"no such file{other_case(file)}")
     robot_file, imported = read_foreign(file, cable_set)
-    return ImportedRobot(_built(robot_file, file), imported.keys, tuple(robot_hints(robot_file)), imported)
+    return ImportedRobot(_built(robot_file, file), imported.spec, tuple(robot_hints(robot_file)), imported)
 
 
 def _built(robot_file: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:

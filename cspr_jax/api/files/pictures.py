@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.selection import is_own_motion, result_at
 from cspr_jax.outputs.plots.style.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.files.disk import Disk
-from cspr_jax.store.files.publishing import check_place, publish
+from cspr_jax.store.files.publishing import check_writable, publish
 from cspr_jax.store.reading.result import Result, open_result
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def plot(  # noqa: PLR0913
     if not sources:
         raise ConfigError("results", "[]: must be one result, or more")
     style = style_of(size, dpi, font_size, preset, title=title)
-    check_place(None if output is None else Path(output))
+    check_writable(None if output is None else Path(output))
     stage("reading")
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in sources]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]

@@ -18,10 +18,9 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.arguments import AnyInteger, CellCoordinates, Kind, Names
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import motion_files
-from cspr_jax.outputs.path_columns import path_columns
+from cspr_jax.outputs.paths import path_columns
 from cspr_jax.outputs.plots.motions.motion_source import completed, keeps_plan, robot_and_plan
-from cspr_jax.outputs.plots.pages.informative import telling
-from cspr_jax.outputs.plots.pages.maps import map_content, order_of
+from cspr_jax.outputs.plots.pages.maps import informative_cells, map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
 from cspr_jax.outputs.plots.pages.solids import solids_content
@@ -32,7 +31,7 @@ from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.files.disk import Disk
-from cspr_jax.store.files.publishing import check_place, publish
+from cspr_jax.store.files.publishing import check_writable, publish
 from cspr_jax.store.reading.result import Result, open_result
 
 ResultOrPlan = Annotated[
@@ -83,7 +82,7 @@ def report(
     output = Path(output)
     if output.suffix != ".html":
         raise ConfigError("-o", f"{output}: must end in .html")
-    check_place(output)
+    check_writable(output)
     if not 0 <= trajectories <= MOST:
         raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
     try:
@@ -169,7 +168,7 @@ def _of_map(
     ]
     warnings = [f"left out, for a page of all would be too large: {', '.join(left)}"] if left else []
     if MAP_KINDS[result.attributes["map"]].planned and "verdict" in result.data:
-        indices += telling(result.data, result.data["verdict"], count)
+        indices += informative_cells(result.data, result.data["verdict"], count)
     elif cells:
         raise InputError("--cell", "given", f'absent with map = "{result.attributes["map"]}", whose cells do not move')
     names, points = order_of(result)
@@ -216,12 +215,12 @@ def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
 
 def _words(result: Result, index: tuple[int, ...]) -> str:
     points = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
-    place = result.place(index)
+    place = result.coordinates(index)
     return ", ".join(value(result, axis, place[axis]) for axis, coordinates in points.items() if len(coordinates) > 1)
 
 
 def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:
-    place = result.place(index)
+    place = result.coordinates(index)
     values = {name: data[index] for name, data in result.data.items()}
     keys = cell_plan(result.settings, place, values)
     if keys is None:

@@ -54,10 +54,10 @@ def read(path: Path, cable_set: str | None) -> Body:
     """A model."""
     bodies, cables = _both(path)
     joint, body = _body(bodies)
-    place, base_shift = body.centre, _joint_place(bodies, joint)
+    centre, base_shift = body.centre, _joint_position(bodies, joint)
     chosen = _cable_set(cables, cable_set)
     tags = [element for element in chosen if isinstance(element.tag, str)]
-    body.cables = [_cable(element, k, cables, place, base_shift) for k, element in enumerate(tags)]
+    body.cables = [_cable(element, k, cables, centre, base_shift) for k, element in enumerate(tags)]
     body.file = cables
     elastic = sorted({element.tag for element in tags} - {_RIGID})
     if elastic:
@@ -127,24 +127,24 @@ def _body(file: Path) -> tuple[_Joint, Body]:
 _PARTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
-def joint_place(file: Path) -> tuple[str, Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
-    """Kind and place of the joint of a model."""
+def joint_position(file: Path) -> tuple[str, Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
+    """Kind, axes and position of the joint of a model."""
     link = _link(file)
     joint = _joint_of(link, file)
     location = vector(child(child(link, "parent", file), "location", file), file, "parent")
-    return child(link, "joint", file).get("type", ""), joint.axes, np.array(location) - _joint_place(file, joint)
+    return child(link, "joint", file).get("type", ""), joint.axes, np.array(location) - _joint_position(file, joint)
 
 
-def _joint_place(file: Path, joint: _Joint) -> list[float]:
+def _joint_position(file: Path, joint: _Joint) -> list[float]:
     # Base points count from a joint that does not move; of planar robots the plane is that of the joint.
     parent = child(_link(file), "parent", file)
     if text_of(child(parent, "num", file)) != "0":
         raise ConfigError(file, "parent.num: must be 0, the base")
-    place = np.array(vector(child(parent, "location", file), file, "parent"))
+    position = np.array(vector(child(parent, "location", file), file, "parent"))
     if joint.pattern == "3R":
-        return place.tolist()
+        return position.tolist()
     normal = joint.axes[1] if joint.pattern in ("1R2T", "2T") else np.zeros(3)
-    return (normal * float(normal @ place)).tolist()
+    return (normal * float(normal @ position)).tolist()
 
 
 def _cable_set(file: Path, set_name: str | None) -> Element:
@@ -153,46 +153,46 @@ def _cable_set(file: Path, set_name: str | None) -> Element:
     name = root.get("default_cable_set", "") if set_name is None else set_name
     if name not in sets:
         key = "default_cable_set" if set_name is None else "--set"
-        known = either(sets) if sets else "absent: the file has no cable_set"
-        raise ConfigError(file, f"{key} = {shown(name)}: {did_you_mean(name, list(sets))}must be {known}")
+        allowed = either(sets) if sets else "absent: the file has no cable_set"
+        raise ConfigError(file, f"{key} = {shown(name)}: {did_you_mean(name, list(sets))}must be {allowed}")
     return sets[name]
 
 
 def _cable(element: Element, k: int, file: Path, centre: list[float], shift: list[float]) -> Cable:
     name = element.get("name", "")
-    place = f"cable {k + 1}" + f' ("{name[:40]}")' * bool(name)
+    label = f"cable {k + 1}" + f' ("{name[:40]}")' * bool(name)
     if not str(element.tag).startswith(_CABLES):
-        raise ConfigError(file, f"{place}: <{element.tag}>: must be a cable, such as <{_RIGID}>")
+        raise ConfigError(file, f"{label}: <{element.tag}>: must be a cable, such as <{_RIGID}>")
     reference = element.get("attachment_reference", "")
     if reference not in ("com", "joint"):
-        raise ConfigError(file, f'{place}.attachment_reference = {shown(reference)}: must be "com" or "joint"')
-    base, end = _ends(child(element, "attachments", file, place), file, place)
-    point = np.array(vector(child(end, "location", file, place), file, place))
+        raise ConfigError(file, f'{label}.attachment_reference = {shown(reference)}: must be "com" or "joint"')
+    base, end = _ends(child(element, "attachments", file, label), file, label)
+    point = np.array(vector(child(end, "location", file, label), file, label))
     cable = Cable([], (point + (centre if reference == "com" else 0.0)).tolist(), name)
     if base.tag == _PULLEY:
-        start = vector(child(base, "fixed_location", file, place), file, place)
-        cable.radius = number(text_of(child(base, "pulley_radius", file, place)), file, f"{place}.pulley_radius")
-        cable.axis = vector(child(base, "cable_entry_vector", file, place), file, place)
+        start = vector(child(base, "fixed_location", file, label), file, label)
+        cable.radius = number(text_of(child(base, "pulley_radius", file, label)), file, f"{label}.pulley_radius")
+        cable.axis = vector(child(base, "cable_entry_vector", file, label), file, label)
     else:
-        start = vector(child(base, "location", file, place), file, place)
+        start = vector(child(base, "location", file, label), file, label)
     cable.base = (np.array(start) - shift).tolist()
-    limits = child(element, "properties", file, place)
+    limits = child(element, "properties", file, label)
     for key, limit in (("tension_min", "force_min"), ("tension_max", "force_max")):
         bound = limits.find(limit)
         if bound is not None:
-            setattr(cable, key, number(text_of(bound), file, f"{place}.{limit}", infinite=key == "tension_max"))
+            setattr(cable, key, number(text_of(bound), file, f"{label}.{limit}", infinite=key == "tension_max"))
     return cable
 
 
-def _ends(attachments: Element, file: Path, place: str) -> tuple[Element, Element]:
+def _ends(attachments: Element, file: Path, label: str) -> tuple[Element, Element]:
     # Return the attachment on the base, which may be a pulley, and the one on the body.
     ends = [element for element in attachments if isinstance(element.tag, str)]
     allowed = f"one attachment on link 0, or a <{_PULLEY}>, and one on link 1"
     links = []
     for element in ends:
         if element.tag not in ("attachment", _PULLEY):
-            raise ConfigError(file, f"{place}: <{element.tag}>: must be {allowed}")
-        links.append("0" if element.tag == _PULLEY else text_of(child(element, "link", file, place)))
+            raise ConfigError(file, f"{label}: <{element.tag}>: must be {allowed}")
+        links.append("0" if element.tag == _PULLEY else text_of(child(element, "link", file, label)))
     if sorted(links) != ["0", "1"]:
-        raise ConfigError(file, f"{place}: attachments on links {', '.join(links) or 'none'}: must be {allowed}"[:300])
+        raise ConfigError(file, f"{label}: attachments on links {', '.join(links) or 'none'}: must be {allowed}"[:300])
     return ends[links.index("0")], ends[links.index("1")]

@@ -53,20 +53,20 @@ def _yaml(text: str) -> Any:
     # Its constructors of numbers and dates raise arbitrary errors, as of "!!int ''" and "!!timestamp x".
     except (yaml.YAMLError, LookupError, AttributeError, ArithmeticError, TypeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
-    if not _size(data, {}) <= LARGEST:
+    if not _value_count(data, {}) <= LARGEST:
         raise ValueError(f"its references (*name) stand for more than {LARGEST} values, or for themselves")
     return data
 
 
-def _size(data: Any, known: dict[int, float]) -> float:
+def _value_count(data: Any, counts: dict[int, float]) -> float:
     # Number of values with references written out; infinite where one holds itself.
     if not isinstance(data, dict | list):
         return 1.0
-    if id(data) not in known:
-        known[id(data)] = math.inf
+    if id(data) not in counts:
+        counts[id(data)] = math.inf
         values = data.values() if isinstance(data, dict) else data
-        known[id(data)] = 1.0 + sum(_size(value, known) for value in values)
-    return known[id(data)]
+        counts[id(data)] = 1.0 + sum(_value_count(value, counts) for value in values)
+    return counts[id(data)]
 
 
 def _read(path: Path, parse: Callable[[str], Any], kind: str) -> Body:
@@ -85,22 +85,22 @@ def _read(path: Path, parse: Callable[[str], Any], kind: str) -> Body:
 class _Table:
     """Part of the file, by its keys."""
 
-    def __init__(self, data: Any, place: str, file: Path) -> None:
+    def __init__(self, data: Any, label: str, file: Path) -> None:
         if not isinstance(data, dict):
-            raise ConfigError(file, f"{place} = {shown(data)}: must be a table")
-        self.data, self.file, self.place = data, file, "" if place == "the file" else f"{place}."
+            raise ConfigError(file, f"{label} = {shown(data)}: must be a table")
+        self.data, self.file, self.prefix = data, file, "" if label == "the file" else f"{label}."
 
     def has(self, key: str) -> bool:
         return self.data.get(key) is not None
 
     def table(self, key: str) -> "_Table":
-        return _Table(self._required(key), self.place + key, self.file)
+        return _Table(self._required(key), self.prefix + key, self.file)
 
     def tables(self, key: str) -> list["_Table"]:
-        rows = self._required(key)
-        if not isinstance(rows, list) or not 1 <= len(rows) <= MOST_CABLES:
-            raise ConfigError(self.file, f"{self.place}{key}: must be a list of 1 to {MOST_CABLES} tables")
-        return [_Table(one, f"{self.place}{key}[{k}]", self.file) for k, one in enumerate(rows)]
+        tables = self._required(key)
+        if not isinstance(tables, list) or not 1 <= len(tables) <= MOST_CABLES:
+            raise ConfigError(self.file, f"{self.prefix}{key}: must be a list of 1 to {MOST_CABLES} tables")
+        return [_Table(one, f"{self.prefix}{key}[{k}]", self.file) for k, one in enumerate(tables)]
 
     def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:
         """Finite numbers of a shape; None where the key is absent, and infinite ones stand for none."""
@@ -116,19 +116,19 @@ class _Table:
             words = f"{' x '.join(map(str, shape))} finite numbers" if shape else "a finite number"
             words += f" up to {model.LARGEST_NUMBER:g}" * bool(values.shape == shape and np.isfinite(values).all())
             value = shown(self.data[key])
-            raise ConfigError(self.file, f"{self.place}{key} = {value}: must be {words}{look_alike(value)}")
+            raise ConfigError(self.file, f"{self.prefix}{key} = {value}: must be {words}{look_alike(value)}")
         return values
 
     def index(self, key: str, count: int, missing: int | None = None) -> int:
         number = self.data.get(key, missing)
         if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < count:
             words = f"must be a number from 0 to {count - 1}{look_alike(shown(number))}"
-            raise ConfigError(self.file, f"{self.place}{key} = {shown(number)}: {words}")
+            raise ConfigError(self.file, f"{self.prefix}{key} = {shown(number)}: {words}")
         return number
 
     def _required(self, key: str) -> Any:
         if not self.has(key):
-            raise ConfigError(self.file, f"{self.place}{key} is missing: a robot of cdpyr has it")
+            raise ConfigError(self.file, f"{self.prefix}{key} is missing: a robot of cdpyr has it")
         return self.data[key]
 
 
@@ -163,7 +163,7 @@ def _pattern(platform: _Table) -> str:
         counts = pattern.get("rotation") or 0, pattern.get("translation") or 0
         pattern = PATTERNS.get(counts, pattern) if all(isinstance(count, int) for count in counts) else pattern
     if not isinstance(pattern, str) or pattern not in PATTERNS.values():
-        key = f"{platform.place}motion_pattern"
+        key = f"{platform.prefix}motion_pattern"
         allowed = f"{either(PATTERNS.values())}{look_alike(shown(pattern))}"
         raise ConfigError(platform.file, f"{key} = {shown(pattern)}: must be {allowed}")
     return pattern
@@ -178,7 +178,7 @@ def _cables(robot: _Table, platform: _Table) -> list[Cable]:
         points = [anchor.numbers("position", 3, missing=[0.0, 0.0, 0.0]) for anchor in (start, end)]
         for anchor, point in zip((start, end), points, strict=True):
             if point is None:
-                raise ConfigError(robot.file, f"{anchor.place}position: must be 3 finite numbers")
+                raise ConfigError(robot.file, f"{anchor.prefix}position: must be 3 finite numbers")
         cable = Cable(*(point.tolist() for point in points if point is not None))
         if start.has("pulley"):
             pulley = start.table("pulley")
@@ -197,8 +197,8 @@ def _rotation(anchor: _Table) -> np.ndarray:
 def _thickness(robot: _Table, body: Body) -> None:
     if not robot.has("cables"):
         return
-    sizes = [cable.numbers("diameter") for cable in robot.tables("cables")]
-    known = [float(size) for size in sizes if size is not None]
-    body.cable_diameter = max(known, default=None)
-    if len(set(known)) > 1:
-        body.warnings.append(f"cables of several diameters: the largest, {max(known):g} m, stands for all")
+    values = [cable.numbers("diameter") for cable in robot.tables("cables")]
+    diameters = [float(value) for value in values if value is not None]
+    body.cable_diameter = max(diameters, default=None)
+    if len(set(diameters)) > 1:
+        body.warnings.append(f"cables of several diameters: the largest, {max(diameters):g} m, stands for all")

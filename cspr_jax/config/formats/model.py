@@ -21,7 +21,7 @@ OF_XY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 OF_YZ = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 OF_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 NO_GRAVITY = 1e-9  # m/s^2; of robots that move in a level plane
-# Share of the size by which points of a planar robot may miss its plane.
+# Fraction of the size by which points of a planar robot may miss its plane.
 OUT_OF_PLANE = 1e-9
 LARGEST = 1e9  # N; larger tensions stand for no limit
 DIGITS = 15  # digits of numbers that are sums
@@ -92,7 +92,7 @@ def about_centre(tensor: Float[np.ndarray, "3 3"], mass: float, centre: list[flo
     return tensor - mass * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
 
 
-def robot_keys(body: Body) -> dict[str, Any]:
+def robot_spec(body: Body) -> dict[str, Any]:
     """Keys of the robot file that a body becomes."""
     if not body.cables:
         raise ConfigError(body.file, "no cables: must be one or more")
@@ -108,20 +108,20 @@ def robot_keys(body: Body) -> dict[str, Any]:
     if not row.is_body:  # it does not turn: forces alone count
         base, platform = base - platform, np.zeros_like(platform)
     notes = list(body.notes)
-    keys: dict[str, Any] = {"name": body.name, "pattern": pattern, "z_axis": "up", "base_points": _rounded(base)}
+    spec: dict[str, Any] = {"name": body.name, "pattern": pattern, "z_axis": "up", "base_points": _rounded(base)}
     if row.is_body:
-        keys["platform_points"] = _rounded(platform)
-    keys["mass"] = body.mass if body.mass else 1.0
+        spec["platform_points"] = _rounded(platform)
+    spec["mass"] = body.mass if body.mass else 1.0
     if not body.mass:
         notes.append("placeholder mass of 1 kg")
     if row.is_body:
-        keys |= _inertia(body, platform, keys["mass"], notes, is_planar=row.is_planar)
+        spec |= _inertia(body, platform, spec["mass"], notes, is_planar=row.is_planar)
     if body.is_level:
-        keys["gravity"] = NO_GRAVITY
-    keys |= _of_cables(body, swivels)
+        spec["gravity"] = NO_GRAVITY
+    spec |= _of_cables(body, swivels)
     # A source that begins so is shown as a placeholder.
-    keys["source"] = "; ".join([*notes, body.source])
-    return keys
+    spec["source"] = "; ".join([*notes, body.source])
+    return spec
 
 
 def _own_pattern(body: Body, platform: np.ndarray) -> str:
@@ -140,9 +140,9 @@ def _own_pattern(body: Body, platform: np.ndarray) -> str:
 
 
 def _check_plane(body: Body, base: np.ndarray, platform: np.ndarray) -> None:
-    room = OUT_OF_PLANE * float(np.ptp(base, axis=0).max())
+    tolerance = OUT_OF_PLANE * float(np.ptp(base, axis=0).max())
     for k, cable in enumerate(body.cables):
-        if abs(base[k, 1] - platform[k, 1]) > room:
+        if abs(base[k, 1] - platform[k, 1]) > tolerance:
             words = f"cable {k + 1}" + f' ("{cable.name[:40]}")' * bool(cable.name)
             raise ConfigError(body.file, f"{words} leaves the plane of a planar robot: must lie in it")
 
@@ -179,20 +179,20 @@ def _is_real(tensor: np.ndarray, *, is_planar: bool) -> bool:
 
 
 def _of_cables(body: Body, swivels: np.ndarray) -> dict[str, Any]:
-    cables, keys = body.cables, dict[str, Any]()
+    cables, spec = body.cables, dict[str, Any]()
     minimum = [cable.tension_min for cable in cables]
     if any(low is not None for low in minimum):
-        keys["tension_min"] = _one([low or 0.0 for low in minimum])
+        spec["tension_min"] = _one([low or 0.0 for low in minimum])
     maximum = [cable.tension_max if cable.tension_max <= LARGEST else math.inf for cable in cables]
     if any(math.isfinite(high) for high in maximum):
-        keys["tension_max"] = _one(maximum)
+        spec["tension_max"] = _one(maximum)
     if body.cable_diameter:
-        keys["cable_diameter"] = body.cable_diameter
+        spec["cable_diameter"] = body.cable_diameter
     if any(cable.radius > 0.0 for cable in cables):
-        keys["pulley_radius"] = _one([cable.radius for cable in cables])
+        spec["pulley_radius"] = _one([cable.radius for cable in cables])
         axes = _rounded(swivels)
-        keys["pulley_axes"] = axes[0] if all(axis == axes[0] for axis in axes) else axes
-    return keys
+        spec["pulley_axes"] = axes[0] if all(axis == axes[0] for axis in axes) else axes
+    return spec
 
 
 def _one(values: list[float]) -> Any:
@@ -200,5 +200,5 @@ def _one(values: list[float]) -> Any:
 
 
 def _rounded(values: np.ndarray) -> Any:
-    # Sums and turned axes are written without the last digit, and without a negative zero.
+    # Sums and rotated axes are written without the last digit, and without a negative zero.
     return [_rounded(row) for row in values] if values.ndim > 1 else [float(f"{x:.{DIGITS}g}") + 0.0 for x in values]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.config.formats.model import Body, robot_keys
+from cspr_jax.config.formats.model import Body, robot_spec
 from cspr_jax.errors import ConfigError, shown
 
 
@@ -34,14 +34,14 @@ class Format:
         return getattr(importlib.import_module(module), name)
 
 
-_HERE = "cspr_jax.config.formats."
+_PACKAGE = "cspr_jax.config.formats."
 FORMATS = (
     Format(
-        "CASPR", (".xml",), "NAME_bodies.xml and NAME_cables.xml, side by side", _HERE + "caspr:read", has_sets=True
+        "CASPR", (".xml",), "NAME_bodies.xml and NAME_cables.xml, side by side", _PACKAGE + "caspr:read", has_sets=True
     ),
-    Format("cdpyr", (".json",), "a robot as JSON", _HERE + "cdpyr:read_json"),
-    Format("cdpyr", (".yaml", ".yml"), "a robot as YAML", _HERE + "cdpyr:read_yaml"),
-    Format("WireX", (".wcrfx",), "a robot of version 0.31 or 0.32", _HERE + "wirex:read"),
+    Format("cdpyr", (".json",), "a robot as JSON", _PACKAGE + "cdpyr:read_json"),
+    Format("cdpyr", (".yaml", ".yml"), "a robot as YAML", _PACKAGE + "cdpyr:read_yaml"),
+    Format("WireX", (".wcrfx",), "a robot of version 0.31 or 0.32", _PACKAGE + "wirex:read"),
 )
 ENDINGS = tuple(ending for row in FORMATS for ending in row.endings)
 
@@ -51,12 +51,12 @@ class Imported:
     """Robot that was read from a file of another program.
 
     Fields:
-        keys: of its robot file.
+        spec: content of its robot file.
         cable_names: in the other file.
         warnings: items that were left out, one line each.
     """
 
-    keys: dict[str, Any]
+    spec: dict[str, Any]
     cable_names: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -68,8 +68,8 @@ def format_of(name: str) -> Format | None:
 
 def parted(reference: str) -> tuple[str, str | None]:
     """File and set of cables that a reference such as "robot_cables.xml#set" names."""
-    name, mark, cable_set = reference.partition("#")
-    return (name, cable_set) if mark and format_of(name) else (reference, None)
+    name, separator, cable_set = reference.partition("#")
+    return (name, cable_set) if separator and format_of(name) else (reference, None)
 
 
 def read(path: Path, cable_set: str | None = None) -> Imported:
@@ -84,5 +84,5 @@ def read(path: Path, cable_set: str | None = None) -> Imported:
     else:
         owners = " and ".join(dict.fromkeys(other.name for other in FORMATS if other.has_sets))
         raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of {owners} have cable sets")
-    keys = robot_keys(body)
-    return Imported(keys, tuple(cable.name for cable in body.cables), tuple(body.warnings))
+    spec = robot_spec(body)
+    return Imported(spec, tuple(cable.name for cable in body.cables), tuple(body.warnings))

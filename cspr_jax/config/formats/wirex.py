@@ -58,17 +58,17 @@ def read(path: Path) -> Body:
     return body
 
 
-def _of(element: Element, key: str, file: Path, place: str, missing: float = 0.0) -> float:
+def _of(element: Element, key: str, file: Path, label: str, missing: float = 0.0) -> float:
     text = element.get(key)
-    return missing if text is None else number(text, file, f"{place}.{key}")
+    return missing if text is None else number(text, file, f"{label}.{key}")
 
 
 def _cable(chain: Element, k: int, file: Path) -> Cable:
-    place = f"chain {k + 1}"
-    base, end = child(chain, "base", file, place), child(chain, "platform", file, place)
-    points = [[_of(one, key, file, f"{place}.{one.tag}") for key in "xyz"] for one in (base, end)]
-    axis = [_of(base, f"a{row}3", file, f"{place}.base", float(row == 3)) for row in (1, 2, 3)]
-    return Cable(points[0], points[1], radius=_of(base, "radius", file, f"{place}.base"), axis=axis)
+    label = f"chain {k + 1}"
+    base, end = child(chain, "base", file, label), child(chain, "platform", file, label)
+    points = [[_of(one, key, file, f"{label}.{one.tag}") for key in "xyz"] for one in (base, end)]
+    axis = [_of(base, f"a{i}3", file, f"{label}.base", float(i == 3)) for i in (1, 2, 3)]
+    return Cable(points[0], points[1], radius=_of(base, "radius", file, f"{label}.base"), axis=axis)
 
 
 def _weigh(platform: Element, body: Body, file: Path) -> None:
@@ -119,9 +119,9 @@ def _limit(root: Element, body: Body, file: Path) -> None:
         cable.tension_max = min(maximum, default=math.inf)
 
 
-def _load(element: Element, key: str, place: str, file: Path) -> float:
+def _load(element: Element, key: str, label: str, file: Path) -> float:
     text = element.get(key)
-    load = 0.0 if text is None else number(text, file, f"{place}.{key}", infinite=True)
+    load = 0.0 if text is None else number(text, file, f"{label}.{key}", infinite=True)
     if load < 0.0:
-        raise ConfigError(file, f"{place}.{key} = {shown(text)}: must be a number >= 0")
+        raise ConfigError(file, f"{label}.{key} = {shown(text)}: must be a number >= 0")
     return load

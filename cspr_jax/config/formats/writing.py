@@ -8,12 +8,12 @@ from typing import Any
 from cspr_jax.errors import printable
 
 
-def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
+def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
     """Text of a robot file."""
     lines = []
     if any(cable_names):
         lines.append("# cables: " + ", ".join(printable(name) for name in cable_names))
-    return "\n".join([*lines, *(f"{key} = {value_text(value)}" for key, value in keys.items())]) + "\n"
+    return "\n".join([*lines, *(f"{key} = {value_text(value)}" for key, value in spec.items())]) + "\n"
 
 
 def value_text(value: Any) -> str:

@@ -56,11 +56,11 @@ def _encoding(data: bytes) -> tuple[str | None, str]:
     return ("UTF-8" if is_utf8 else None), name
 
 
-def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
+def child(parent: Element, tag: str, file: object, label: str = "") -> Element:
     """The one element of a kind below another."""
     elements = parent.findall(tag)
     if len(elements) != 1:
-        raise ConfigError(file, f"{place or parent.tag}: {len(elements)} elements <{tag}>: must be one")
+        raise ConfigError(file, f"{label or parent.tag}: {len(elements)} elements <{tag}>: must be one")
     return elements[0]
 
 
@@ -69,21 +69,21 @@ def text_of(element: Element) -> str:
     return (element.text or "").strip()
 
 
-def number(text: str, file: object, place: str, *, infinite: bool = False) -> float:
+def number(text: str, file: object, label: str, *, infinite: bool = False) -> float:
     """A number."""
     try:
         value = float(text[:100])
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST_NUMBER and not (infinite and value > 0.0):
-        size = f" up to {LARGEST_NUMBER:g}" * math.isfinite(value)
-        raise ConfigError(file, f"{place} = {shown(text)}: must be a finite number{size}{look_alike(text[:100])}")
+        bound = f" up to {LARGEST_NUMBER:g}" * math.isfinite(value)
+        raise ConfigError(file, f"{label} = {shown(text)}: must be a finite number{bound}{look_alike(text[:100])}")
     return value
 
 
-def vector(element: Element, file: object, place: str) -> list[float]:
+def vector(element: Element, file: object, label: str) -> list[float]:
     """A point or a direction."""
     words = text_of(element).split()
     if len(words) != 3:
-        raise ConfigError(file, f"{place}.{element.tag} = {shown(text_of(element))}: must be three numbers")
-    return [number(word, file, f"{place}.{element.tag}") for word in words]
+        raise ConfigError(file, f"{label}.{element.tag} = {shown(text_of(element))}: must be three numbers")
+    return [number(word, file, f"{label}.{element.tag}") for word in words]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 # By which radii at start and end may differ, of the radius: as controllers have it.
 RADIUS_TOLERANCE = 0.001
-# Places that are nearer to each other are one, m.
+# Positions that are nearer to each other are one, m.
 SAME_PLACE = 1e-9
 
 
@@ -24,7 +24,7 @@ class PlaneArc(NamedTuple):
 
 
 class ArcError(ValueError):
-    """Numbers that make no arc: the word or fault, and what is allowed."""
+    """Numbers that make no arc: the word or error, and what is allowed."""
 
 
 def missed(half: float) -> float:
@@ -67,7 +67,7 @@ def arc_about(start: list[float], end: list[float], centre: list[float], sign: f
 
 
 def _beside(start: list[float], end: list[float], height: float) -> list[float]:
-    # Place beside the middle of a chord, to its left where the height is above 0.
+    # Position beside the middle of a chord, to its left where the height is above 0.
     across, up = end[0] - start[0], end[1] - start[1]
     chord = math.hypot(across, up)
     return [0.5 * (start[0] + end[0]) - height * up / chord, 0.5 * (start[1] + end[1]) + height * across / chord]

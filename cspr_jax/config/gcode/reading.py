@@ -81,8 +81,8 @@ def _decimals(text: str) -> int:
 class _GcodeReader:
     def __init__(self, path: Path, start: list[float] | None, decimals: int) -> None:
         self.path, self.moves, self.line = path, list[Move](), 0
-        # Coordinates as written, and the place at which the last move ends: arcs may miss the first ones.
-        self.place: list[float | None] = [None] * 3 if start is None else [*start]
+        # Coordinates as written, and the position at which the last move ends: arcs may miss the first ones.
+        self.position: list[float | None] = [None] * 3 if start is None else [*start]
         self.end, self.shift, self.half_unit = start, [0.0] * 3, 0.5 * 0.1**decimals
         self.modes = {"motion": -1.0, "plane": 17.0, "units": 21.0, "distances": 90.0, "centres": 91.1}
         self.speed, self.feed, self.override = math.inf, "", 1.0
@@ -109,7 +109,7 @@ class _GcodeReader:
         return ends
 
     def check(self) -> None:
-        unknown = [letter for letter, x in zip("XYZ", self.place, strict=True) if x is None]
+        unknown = [letter for letter, x in zip("XYZ", self.position, strict=True) if x is None]
         if not self.moves and unknown:
             names = " and ".join(unknown)
             allowed = "must be given, absolute: the path begins where X, Y and Z are known"
@@ -189,12 +189,12 @@ class _GcodeReader:
         return lengths
 
     def _shift(self, axes: dict[str, Word]) -> None:
-        # The place is to have these coordinates; one that is not known yet has them.
+        # The position is to have these coordinates; one that is not known yet has them.
         for letter, length in self._lengths(axes).items():
             i = "XYZ".find(letter)
             if i >= 0:
-                before = self.place[i]
-                self.place[i] = length if before is None else before
+                before = self.position[i]
+                self.position[i] = length if before is None else before
                 self.shift[i] = 0.0 if before is None else length - before
         self._begin()
 
@@ -206,7 +206,7 @@ class _GcodeReader:
             return
         named = [i for i, letter in enumerate("XYZ") if letter in axes] or range(3)
         for i in named:
-            self.place[i], self.shift[i], self.end = None, 0.0, None
+            self.position[i], self.shift[i], self.end = None, 0.0, None
 
     def _pause(self) -> None:
         if self.moves:
@@ -236,7 +236,7 @@ class _GcodeReader:
                 raise WordError(line.values["P"].text, "must be absent of arcs: write each turn as an arc")
             self._add_arc(lengths, 1.0 if motion == 3.0 else -1.0)
         else:
-            end = [float(x or 0.0) for x in self.place]
+            end = [float(x or 0.0) for x in self.position]
             if math.dist(end, self.end) > SAME_PLACE:
                 speed, feed = (self.speed, self._feed) if motion else (math.inf, "")
                 self.moves.append(Move(self.line, self.end, end, speed=speed, feed=feed))
@@ -247,24 +247,24 @@ class _GcodeReader:
         return self.feed if self.override == 1.0 or not self.feed else f"{self.feed} at {100.0 * self.override:g} %"
 
     def _set_axis(self, i: int, length: float | None) -> None:
-        before = self.place[i]
+        before = self.position[i]
         if length is None:
             return
         if self.modes["distances"] == 91.0:
-            self.place[i] = None if before is None else before + length
+            self.position[i] = None if before is None else before + length
         else:
-            self.place[i] = length - self.shift[i]
+            self.position[i] = length - self.shift[i]
 
     def _begin(self) -> None:
         # The path begins where all coordinates are known.
-        if self.end is None and None not in self.place:
-            self.end, self.first = [float(x or 0.0) for x in self.place], self.line
+        if self.end is None and None not in self.position:
+            self.end, self.first = [float(x or 0.0) for x in self.position], self.line
 
     def _add_arc(self, lengths: dict[str, float], sign: float) -> None:
         normal, letters, offsets = _PLANES[int(self.modes["plane"])]
         ones = ["XYZ".index(letter) for letter in letters]
-        place, before = [float(x or 0.0) for x in self.place], list(self.end or [])
-        start, end = [before[i] for i in ones], [place[i] for i in ones]
+        position, before = [float(x or 0.0) for x in self.position], list(self.end or [])
+        start, end = [before[i] for i in ones], [position[i] for i in ones]
         others = [letter for letter in "IJK" if letter in lengths and letter not in offsets]
         centred = [letter for letter in offsets if letter in lengths]
         if others:
@@ -277,9 +277,9 @@ class _GcodeReader:
         else:
             arc = arc_about(start, end, self._centre(start, ones, offsets, lengths), sign, half)
         for i, x in zip(ones, arc.end, strict=True):
-            place[i] = x
-        self.moves.append(Move(self.line, before, place, arc.centre, arc.angle, self.speed, self._feed, normal))
-        self.end = place
+            position[i] = x
+        self.moves.append(Move(self.line, before, position, arc.centre, arc.angle, self.speed, self._feed, normal))
+        self.end = position
 
     @staticmethod
     def _arc_words(offsets: str) -> str:

@@ -11,7 +11,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cspr_jax.config.keys.limits import Point, Positive, has_direction
 from cspr_jax.config.keys.trajectory import Angle
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import table_error
 from cspr_jax.errors.given_numbers import SMALLEST
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class OscillationTable(Table):
     @model_validator(mode="after")
     def _has_axis(self) -> "OscillationTable":
         if not has_direction(self.axis):
-            raise fault("axis", self.axis, f"a direction, of length {SMALLEST:g} at least")
+            raise table_error("axis", self.axis, f"a direction, of length {SMALLEST:g} at least")
         return self
 
 
@@ -61,7 +61,7 @@ SweepFrequency = Annotated[
 
 
 class EllipseShape(Table):
-    """Size and attitude of an ellipse."""
+    """Dimensions and attitude of an ellipse."""
 
     half_axes: Annotated[list[Point], Field(min_length=1, max_length=2)] | None = Field(
         None,
@@ -78,14 +78,14 @@ class EllipseShape(Table):
     @model_validator(mode="after")
     def _one_shape(self) -> "EllipseShape":
         if self.half_axes is not None and self.radius is not None:
-            raise fault("radius", self.radius, "half_axes, or the radius of a circle: one of them")
+            raise table_error("radius", self.radius, "half_axes, or the radius of a circle: one of them")
         if self.half_axes is not None:
             if self.normal is not None:
-                raise fault("normal", self.normal, "absent beside half_axes")
+                raise table_error("normal", self.normal, "absent beside half_axes")
             if not any(has_direction(axis) for axis in self.half_axes):
-                raise fault("half_axes", self.half_axes, f"one or two axes, one of length {SMALLEST:g} at least")
+                raise table_error("half_axes", self.half_axes, f"one or two axes, one of length {SMALLEST:g} at least")
         if self.normal is not None and not has_direction(self.normal):
-            raise fault("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
+            raise table_error("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
         return self
 
     def axes(self, *, is_planar: bool) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
@@ -136,21 +136,21 @@ def circle_axes(
 
 
 def cell_axes(
-    table: SweepEllipse, place: Mapping[str, Any], *, is_planar: bool
+    table: SweepEllipse, coordinates: Mapping[str, Any], *, is_planar: bool
 ) -> tuple[Float[np.ndarray, "... 3"], Float[np.ndarray, "... 3"]]:
     """Half-axes of the ellipses of cells of a map, in the axes of the file."""
-    size = np.asarray(place.get("circle_radius", place.get("scale", 1.0)), float)[..., None]
-    tilt, azimuth = (np.asarray(place.get(name, 0.0), float)[..., None] for name in ("tilt", "tilt_azimuth"))
+    scale = np.asarray(coordinates.get("circle_radius", coordinates.get("scale", 1.0)), float)[..., None]
+    tilt, azimuth = (np.asarray(coordinates.get(name, 0.0), float)[..., None] for name in ("tilt", "tilt_azimuth"))
     level = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=-1)
 
     def rotated(axis: np.ndarray) -> np.ndarray:
         # About the level direction.
         along = level * (level @ axis)[..., None]
-        return size * (along + np.cos(tilt) * (axis - along) + np.sin(tilt) * np.cross(level, axis))
+        return scale * (along + np.cos(tilt) * (axis - along) + np.sin(tilt) * np.cross(level, axis))
 
     a, b = table.axes(is_planar=is_planar)
     return rotated(a), rotated(b)
 
 
 # Keys of a plan that is one ellipse.
-WHOLE = tuple(EllipseTable.model_fields)
+ELLIPSE_KEYS = tuple(EllipseTable.model_fields)

@@ -6,19 +6,21 @@ from pydantic import Field, field_validator, model_validator
 
 from cspr_jax.config.keys.limits import Coordinate, Point, Positive
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import table_error
 
-Size = Annotated[float, Field(ge=0.0, le=1e3)]
+ErrorMagnitude = Annotated[float, Field(ge=0.0, le=1e3)]
 Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 
 
 class ErrorTable(Table):
     """Errors of a launch, whose scatter is computed."""
 
-    release: Size = Field(0.0, description="standard deviation of the instant of release, s")
-    cable_length: Size = Field(0.0, description="standard deviation of the length of each cable at the release, m")
-    cable_speed: Size = Field(0.0, description="standard deviation of the rate of each cable's length, m/s")
-    encoder: Size = Field(
+    release: ErrorMagnitude = Field(0.0, description="standard deviation of the instant of release, s")
+    cable_length: ErrorMagnitude = Field(
+        0.0, description="standard deviation of the length of each cable at the release, m"
+    )
+    cable_speed: ErrorMagnitude = Field(0.0, description="standard deviation of the rate of each cable's length, m/s")
+    encoder: ErrorMagnitude = Field(
         0.0, description="largest error of each cable's length due to the resolution of its encoder, m"
     )
     throws: Annotated[int, Field(ge=2, le=1_000_000)] = Field(10_000, description="number of throws in the sample")
@@ -54,15 +56,17 @@ class LaunchTable(Table):
     @model_validator(mode="after")
     def _one_parabola(self) -> "LaunchTable":
         if self.point is None and self.velocity is None:
-            raise fault("point", None, "the place of the release, or velocity at the target: one of them")
+            raise table_error("point", None, "the place of the release, or velocity at the target: one of them")
         if self.point is not None and self.velocity is not None:
             for name in ("time", "choose"):
                 if getattr(self, name) is not None:
-                    raise fault(name, getattr(self, name), "cannot be combined with point and velocity, which tell it")
+                    raise table_error(
+                        name, getattr(self, name), "cannot be combined with point and velocity, which tell it"
+                    )
             return self
         if (self.time is None) == (self.choose is None):
             allowed = 'a time of flight, or choose = "energy" or "time": one of them'
-            raise fault("time", self.time, allowed)
+            raise table_error("time", self.time, allowed)
         return self
 
 

@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import table_error
 from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
@@ -26,12 +26,12 @@ LARGEST_LENGTH = 1e6
 MOST_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
+MatrixRow = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
 
 
 def _not_tiny(value: float) -> float:
     if 0.0 < abs(value) < SMALLEST:
-        raise fault("", value, f"at least {SMALLEST:g}")
+        raise table_error("", value, f"at least {SMALLEST:g}")
     return value
 
 
@@ -75,8 +75,8 @@ def _variant_of_vectors(value: Any) -> str:
 
 
 def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
-    several = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
-    return Annotated[Annotated[one, Tag("~one")] | several, Discriminator(variant)]
+    many = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
+    return Annotated[Annotated[one, Tag("~one")] | many, Discriminator(variant)]
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
@@ -88,15 +88,15 @@ PerCableDirection: Any = _one_or_each(Direction, Direction, _variant_of_vectors)
 
 
 def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
-    keys: dict[str, Any] = {}
-    for row in LIMITS:
-        if row.per_cable == per_cable:
-            kind = Coordinate if row.is_height else NotNegativePerCable if row.from_zero else PerCable
-            kind = kind if per_cable or row.is_height else Positive
-            kind = TensionPerCable if row.name == "tension_max" else kind
-            text = f"{row.description}{', one number, or one per cable' * per_cable}, {row.unit}"
-            keys[row.name] = (kind | None, Field(None, description=text))
-    return keys
+    fields: dict[str, Any] = {}
+    for limit in LIMITS:
+        if limit.per_cable == per_cable:
+            kind = Coordinate if limit.is_height else NotNegativePerCable if limit.from_zero else PerCable
+            kind = kind if per_cable or limit.is_height else Positive
+            kind = TensionPerCable if limit.name == "tension_max" else kind
+            text = f"{limit.description}{', one number, or one per cable' * per_cable}, {limit.unit}"
+            fields[limit.name] = (kind | None, Field(None, description=text))
+    return fields
 
 
 # Their fields are rows of `schema.limits.LIMITS`; mypy asks nothing of a base that it does not know.
@@ -109,11 +109,11 @@ class LimitKeys(_Cables):
 
 def _uncertainty_keys() -> dict[str, Any]:
     return {
-        row.name: (
-            Annotated[float, Field(ge=row.least, le=row.largest)],
-            Field(row.least, description=f"{row.description}, {row.unit}"),
+        uncertainty.name: (
+            Annotated[float, Field(ge=uncertainty.smallest, le=uncertainty.largest)],
+            Field(uncertainty.smallest, description=f"{uncertainty.description}, {uncertainty.unit}"),
         )
-        for row in UNCERTAINTIES
+        for uncertainty in UNCERTAINTIES
     }
 
 
@@ -126,7 +126,7 @@ class UncertaintyTable(_Uncertainties):
 
     @model_validator(mode="after")
     def _beyond_least(self) -> "UncertaintyTable":
-        if all(getattr(self, row.name) == row.least for row in UNCERTAINTIES):
+        if all(getattr(self, uncertainty.name) == uncertainty.smallest for uncertainty in UNCERTAINTIES):
             raise ValueError("at least one of its keys beyond its smallest value, else nothing is uncertain")
         return self
 

@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.keys.limits import Coordinate, NotTiny, Point
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import table_error
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.tolerances import UNIT_NORM
@@ -16,7 +16,7 @@ from cspr_jax.robots.model import shapes
 MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
 Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH), NotTiny]
-Size = Annotated[list[Extent], Field(min_length=3, max_length=3)]
+EdgeLengths = Annotated[list[Extent], Field(min_length=3, max_length=3)]
 Component = Annotated[float, Field(ge=-1.1, le=1.1)]
 Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
 Corners = Annotated[list[Point], Field(min_length=2, max_length=2)]
@@ -27,7 +27,7 @@ HullOf = Annotated[
 ]
 
 # Keys of each kind: those that it needs, and those that it may have.
-_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+_KEYS_OF_KIND: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "sphere": (("centre", "radius"), ()),
     "cylinder": (("start", "end", "radius"), ()),
     "box": ((), ("corners", "centre", "size", "quaternion")),
@@ -45,7 +45,7 @@ class ObstacleTable(Table):
     end: Point | None = Field(
         None, description="cylinder: the other end of its axis, m; half a ball of its radius lies beyond both ends"
     )
-    size: Size | None = Field(None, description="box: lengths of its edges along its own axes, m")
+    size: EdgeLengths | None = Field(None, description="box: lengths of its edges along its own axes, m")
     quaternion: Quaternion | None = Field(
         None, description="box: orientation, scalar first (default [1, 0, 0, 0], along the axes of the robot file)"
     )
@@ -57,13 +57,13 @@ class ObstacleTable(Table):
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> "ObstacleTable":
-        needed, allowed = _KEYS[self.kind]
+        needed, allowed = _KEYS_OF_KIND[self.kind]
         for name in needed:
             if getattr(self, name) is None:
-                raise fault(name, None, f"a {self.kind} needs it")
+                raise table_error(name, None, f"a {self.kind} needs it")
         for name in ("centre", "radius", "start", "end", "size", "quaternion", "corners"):
             if getattr(self, name) is not None and name not in (*needed, *allowed):
-                raise fault(name, getattr(self, name), f"absent: a {self.kind} has none")
+                raise table_error(name, getattr(self, name), f"absent: a {self.kind} has none")
         if self.kind == "box":
             self._check_box()
         return self
@@ -72,14 +72,14 @@ class ObstacleTable(Table):
         if self.corners is None:
             for name in ("centre", "size"):
                 if getattr(self, name) is None:
-                    raise fault(name, None, "a box needs centre and size, or corners")
+                    raise table_error(name, None, "a box needs centre and size, or corners")
         else:
             for name in ("centre", "size", "quaternion"):
                 if getattr(self, name) is not None:
-                    raise fault(name, getattr(self, name), "cannot be combined with corners")
+                    raise table_error(name, getattr(self, name), "cannot be combined with corners")
             _check_corners("corners", self.corners)
         if self.quaternion is not None and not _is_unit(self.quaternion):
-            raise fault("quaternion", self.quaternion, "a unit quaternion, scalar first")
+            raise table_error("quaternion", self.quaternion, "a unit quaternion, scalar first")
 
     def shape(self) -> shapes.Obstacle:
         """The shape."""
@@ -113,16 +113,18 @@ class PlatformShapeKeys(Table):
     @model_validator(mode="after")
     def _one_shape(self) -> "PlatformShapeKeys":
         if self.platform_box is not None and self.platform_hull is not None:
-            raise fault("platform_hull", self.platform_hull, "cannot be combined with platform_box")
+            raise table_error("platform_hull", self.platform_hull, "cannot be combined with platform_box")
         if self.platform_box is not None:
             _check_corners("platform_box", self.platform_box)
         if self.platform_hull is False:
-            raise fault("platform_hull", False, "true, a list of points, or absent")
+            raise table_error("platform_hull", False, "true, a list of points, or absent")
         if isinstance(self.platform_hull, list):
             try:
                 shapes.hull(self.platform_hull)
             except InputError as error:
-                raise fault("platform_hull", self.platform_hull, "four points or more, not all in a plane") from error
+                raise table_error(
+                    "platform_hull", self.platform_hull, "four points or more, not all in a plane"
+                ) from error
         return self
 
     def body(
@@ -141,7 +143,7 @@ class PlatformShapeKeys(Table):
         return None
 
 
-class SurroundingsKeys(PlatformShapeKeys):
+class ObstacleKeys(PlatformShapeKeys):
     """Bodies that a robot must not meet while it moves."""
 
     obstacle: Obstacles | None = Field(None, description="[[obstacle]], bodies fixed in space that nothing may meet")
@@ -152,14 +154,14 @@ class SurroundingsKeys(PlatformShapeKeys):
         return [table.shape() for table in self.obstacle or ()]
 
     @property
-    def surroundings(self) -> tuple[str, ...]:
+    def obstacle_keys(self) -> tuple[str, ...]:
         """Names of the keys of obstacles and shapes that are given."""
-        return tuple(name for name in SurroundingsKeys.model_fields if getattr(self, name) is not None)
+        return tuple(name for name in ObstacleKeys.model_fields if getattr(self, name) is not None)
 
 
 def _check_corners(key: str, corners: list[list[float]]) -> None:
     if any(low > high for low, high in zip(*corners, strict=True)):
-        raise fault(key, corners, "[least, largest], no coordinate of the first above the second's")
+        raise table_error(key, corners, "[least, largest], no coordinate of the first above the second's")
 
 
 def _is_unit(quaternion: list[float]) -> bool:

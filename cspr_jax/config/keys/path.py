@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from cspr_jax.config.keys.limits import NotNegative, Point, Positive, has_direction
 from cspr_jax.config.keys.trajectory import Angle, Quaternion
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import either, fault
+from cspr_jax.config.wording import either, table_error
 from cspr_jax.errors import shown
 from cspr_jax.errors.given_numbers import SMALLEST
 from cspr_jax.schema.limits import LARGEST_GRID
@@ -31,7 +31,7 @@ _KINDS = {
 }
 _NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
 GRID, RAMP_TIME = 500, 0.1
-# Places less far apart are one, m.
+# Positions less far from each other are one, m.
 SAME_PLACE = 1e-9
 # Number of cells of a grid in maps, where many paths are asked.
 MAP_GRID = 200
@@ -96,23 +96,23 @@ class PathTable(Table):
         for key, kinds in _KINDS.items():
             value = getattr(self, key)
             if value is not None and self.kind not in kinds:
-                raise fault(key, shown(value), f"absent unless kind = {either(kinds)}")
+                raise table_error(key, shown(value), f"absent unless kind = {either(kinds)}")
         for key in _NEEDED.get(self.kind, ()):
             if getattr(self, key) is None:
-                raise fault(key, None, f"a path of kind {self.kind} needs it")
+                raise table_error(key, None, f"a path of kind {self.kind} needs it")
         for key in ("orientations", "closed") if self.kind in _KINDS["points"] and self.points is None else ():
             if getattr(self, key) is not None:
-                raise fault(key, shown(getattr(self, key)), "absent without points")
+                raise table_error(key, shown(getattr(self, key)), "absent without points")
         if self.angle is not None and abs(self.angle) < SMALLEST:
-            raise fault("angle", self.angle, f"an angle of {SMALLEST:g} at least, of either sign")
+            raise table_error("angle", self.angle, f"an angle of {SMALLEST:g} at least, of either sign")
         if self.normal is not None and not has_direction(self.normal):
-            raise fault("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
+            raise table_error("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
         if (self.corner == "blend") != (self.blend_tolerance is not None):
             if self.blend_tolerance is None:
-                raise fault("blend_tolerance", None, 'a distance in m, with corner = "blend"')
-            raise fault("blend_tolerance", self.blend_tolerance, 'absent unless corner = "blend"')
+                raise table_error("blend_tolerance", None, 'a distance in m, with corner = "blend"')
+            raise table_error("blend_tolerance", self.blend_tolerance, 'absent unless corner = "blend"')
         if self.corner is not None and self.interpolation in ("cubic", "quintic"):
-            raise fault("corner", shown(self.corner), 'absent unless interpolation = "polyline"')
+            raise table_error("corner", shown(self.corner), 'absent unless interpolation = "polyline"')
         return self
 
     @property
@@ -164,20 +164,22 @@ class TargetPath(Table):
     @model_validator(mode="after")
     def _blends_a_lift(self) -> "TargetPath":
         if self.lift is None and self.blend_tolerance is not None:
-            raise fault("blend_tolerance", self.blend_tolerance, "absent without lift: straight lines have no corners")
+            raise table_error(
+                "blend_tolerance", self.blend_tolerance, "absent without lift: straight lines have no corners"
+            )
         return self
 
     def between(self, start: Sequence[float], end: Sequence[float], z_axis: str) -> PathTable | None:
         """Path from the start to a target, as plans have it."""
-        keys: dict[str, Any] = {
+        options: dict[str, Any] = {
             "grid": MAP_GRID if self.grid is None else self.grid,
             "ramp_time": RAMP_TIME if self.ramp_time is None else self.ramp_time,
         }
         stays = math.dist(start, end) <= SAME_PLACE
         if self.lift is None:
-            return None if stays else PathTable(kind="line", **keys)
+            return None if stays else PathTable(kind="line", **options)
         rise = self.lift if z_axis == "up" else -self.lift
         above = [[float(x), float(y), float(z) + rise] for x, y, z in ([start] if stays else [start, end])]
         if self.blend_tolerance is not None:
-            keys |= {"corner": "blend", "blend_tolerance": self.blend_tolerance}
-        return PathTable(kind="polyline", points=above, **keys)
+            options |= {"corner": "blend", "blend_tolerance": self.blend_tolerance}
+        return PathTable(kind="polyline", points=above, **options)

@@ -17,7 +17,7 @@ Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
 BetaHat = Annotated[float, Field(ge=-100, le=100)]
 
 
-Beat = Literal["beta_ff", "beta_f", "beta_0", "beta_1"]
+RotationLaw = Literal["beta_ff", "beta_f", "beta_0", "beta_1"]
 
 
 class NamedAmplitude(Table):
@@ -78,7 +78,7 @@ class TrajectoryKeys(Table):
         "epsilon = ... }, { polynomial = [...] }; it must meet (2.49), which A1 and A3 do not, or, for transitions, "
         '(1.27) and (1.28), which they do; "ideal" (A = tau) serves for bounds in maps of transitions',
     )
-    beat: Beat | None = Field(
+    beat: RotationLaw | None = Field(
         None,
         description='platforms: time function of the rotation: "beta_ff" (3.93), the default, with a beta-hat for '
         'each end; "beta_f" (3.68), with the beta-hat of the target at both ends, or of the start on the way to rest; '

@@ -6,15 +6,15 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from cspr_jax.config.keys.limits import NotTiny
-from cspr_jax.config.keys.obstacles import Obstacles, SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
 from cspr_jax.config.keys.trajectory import Quaternion
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import table_error
 
 Condition = Literal["static", "wrench-feasible", "wrench-closure", "interference-free"]
 Component = Annotated[float, Field(ge=-1e12, le=1e12)]
 Speed = Annotated[float, Field(gt=0.0, le=1e6), NotTiny]
-Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e12)]], Field(min_length=1, max_length=6)]
+HalfWidths = Annotated[list[Annotated[float, Field(ge=0.0, le=1e12)]], Field(min_length=1, max_length=6)]
 
 
 class PoseConditions(Table):
@@ -60,10 +60,10 @@ class PoseConditions(Table):
         "weight",
     )
 
-    wrench_box: Sizes | None = Field(
+    wrench_box: HalfWidths | None = Field(
         None, description="wrench-feasible: half widths of a box of wrenches about each of `wrenches`, N and N m"
     )
-    wrench_ellipsoid: Sizes | None = Field(
+    wrench_ellipsoid: HalfWidths | None = Field(
         None, description="wrench-feasible: semi-axes of an ellipsoid of wrenches about each of `wrenches`, N and N m"
     )
     acceleration: Annotated[float, Field(ge=0.0, le=1e6)] | None = Field(
@@ -90,28 +90,30 @@ class PoseConditions(Table):
         is_of_some = self.orientations in ("inclusion", "total")
         for name in ("tilt_max", "quaternions"):
             if getattr(self, name) is not None and not is_of_some:
-                raise fault(
+                raise table_error(
                     name, getattr(self, name), 'absent: workspace.orientations is neither "inclusion" nor "total"'
                 )
         if is_of_some and (self.tilt_max is None) == (self.quaternions is None):
-            raise fault("tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"')
+            raise table_error(
+                "tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"'
+            )
         if self.prove and self.orientations is not None:
-            raise fault("prove", True, "cannot be combined with workspace.orientations")
+            raise table_error("prove", True, "cannot be combined with workspace.orientations")
         if self.torsion_max is not None and self.tilt_max is None:
-            raise fault("torsion_max", self.torsion_max, "absent without tilt_max")
+            raise table_error("torsion_max", self.torsion_max, "absent without tilt_max")
         if self.divisions is not None and (self.orientations is None or self.quaternions is not None):
-            raise fault("divisions", self.divisions, "absent: there is no set of orientations to divide")
+            raise table_error("divisions", self.divisions, "absent: there is no set of orientations to divide")
         return self
 
     @model_validator(mode="after")
     def _somebody_asks(self) -> "PoseConditions":
         for name in ("wrenches", "wrench_box", "wrench_ellipsoid", "acceleration", "capacity_length"):
             if getattr(self, name) is not None and "wrench-feasible" not in self.conditions:
-                raise fault(name, getattr(self, name), 'absent: "wrench-feasible" is not among the conditions')
+                raise table_error(name, getattr(self, name), 'absent: "wrench-feasible" is not among the conditions')
         return self
 
 
-class WorkspaceTable(SurroundingsKeys, PoseConditions):
+class WorkspaceTable(ObstacleKeys, PoseConditions):
     """Conditions of the workspace; a pose meets all of them."""
 
     obstacle: Obstacles | None = Field(
@@ -138,5 +140,5 @@ class WorkspaceTable(SurroundingsKeys, PoseConditions):
         for name in ("obstacle", "platform_box", "platform_hull"):
             if getattr(self, name) is not None and "interference-free" not in self.conditions:
                 value = self.model_dump(include={name}, exclude_none=True)[name]
-                raise fault(name, value, 'absent: "interference-free" is not among the conditions')
+                raise table_error(name, value, 'absent: "interference-free" is not among the conditions')
         return self

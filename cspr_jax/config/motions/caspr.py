@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cspr_jax.config.formats.caspr import joint_place
+from cspr_jax.config.formats.caspr import joint_position
 from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of
 from cspr_jax.config.motions.table import MotionPieces
 from cspr_jax.config.wording import either
@@ -64,31 +64,31 @@ _COORDINATES = {
 def read(path: Path, name: str | None = None, bodies: Path | None = None) -> MotionPieces:
     """A trajectory of CASPR, in the axes of the robot file that `config.formats.caspr` makes of its model."""
     element = _chosen(path, name)
-    place = f'trajectory "{element.get("id", "")[:40]}"'
+    label = f'trajectory "{element.get("id", "")[:40]}"'
     if element.tag not in _KINDS:
-        raise ConfigError(path, f"{place}: <{element.tag}>: must be {either(_KINDS)}"[:400])
-    kind, axes, start = joint_place(_bodies(path, bodies))
+        raise ConfigError(path, f"{label}: <{element.tag}>: must be {either(_KINDS)}"[:400])
+    kind, axes, start = joint_position(_bodies(path, bodies))
     coordinates = _COORDINATES[kind]
     count = len(coordinates.moves) + len(coordinates.turns)
-    points = [point for point in child(element, "points", path, place) if isinstance(point.tag, str)]
+    points = [point for point in child(element, "points", path, label) if isinstance(point.tag, str)]
     if len(points) < 2:
-        raise ConfigError(path, f"{place}: {len(points)} points: must be two or more")
-    times = _times(element, points, path, place)
-    values = [_values(points, tag, count, path, place) for tag in _KINDS[str(element.tag)]]
+        raise ConfigError(path, f"{label}: {len(points)} points: must be two or more")
+    times = _times(element, points, path, label)
+    values = [_values(points, tag, count, path, label) for tag in _KINDS[str(element.tag)]]
     if element.tag == _AVERAGE:
-        values.append(_average(points, times, values[0], path, place))
+        values.append(_average(points, times, values[0], path, label))
     if len(coordinates.turns) == 3 and any(rates[:, -3:].any() for rates in values[1:]):
-        raise ConfigError(path, f"{place}: rates of angles: must be 0, as CASPR demands of joints that turn in space")
-    knots, table, law = (_blends if element.tag == _BLEND else _curves)(element, points, times, values, path, place)
+        raise ConfigError(path, f"{label}: rates of angles: must be 0, as CASPR demands of joints that turn in space")
+    knots, table, law = (_blends if element.tag == _BLEND else _curves)(element, points, times, values, path, label)
     position = np.zeros((*table.shape[:2], 3))
     position[:, :, coordinates.moves] = table[:, :, : len(coordinates.moves)]
     quaternion = None
     if coordinates.turns:
-        _check_turns(values[0][:, len(coordinates.moves) :], path, place)
+        _check_turns(values[0][:, len(coordinates.moves) :], path, label)
         try:
-            knots, position, quaternion = _turned(coordinates, knots, position, table, law, values[0])
+            knots, position, quaternion = _rotating_pieces(coordinates, knots, position, table, law, values[0])
         except InputError as error:
-            raise ConfigError(path, f"{place}: {error}") from error
+            raise ConfigError(path, f"{label}: {error}") from error
         quaternion[:, :, 1:] = quaternion[:, :, 1:] @ axes.T
     return MotionPieces(knots, (position + start) @ axes.T, quaternion, "up", "origin")
 
@@ -117,40 +117,40 @@ def _bodies(path: Path, bodies: Path | None) -> Path:
     return file
 
 
-def _attribute(element: Element, key: str, path: Path, place: str) -> float:
-    return number(element.get(key, ""), path, f"{place}.{key}")
+def _attribute(element: Element, key: str, path: Path, label: str) -> float:
+    return number(element.get(key, ""), path, f"{label}.{key}")
 
 
-def _times(element: Element, points: list[Element], path: Path, place: str) -> np.ndarray:
+def _times(element: Element, points: list[Element], path: Path, label: str) -> np.ndarray:
     definition = element.get("time_definition", "")
     if definition not in ("relative", "absolute"):
-        raise ConfigError(path, f'{place}.time_definition = {shown(definition)}: must be "relative" or "absolute"')
-    stated = [_attribute(point, "time", path, f"{place}, point {k + 2}") for k, point in enumerate(points[1:])]
+        raise ConfigError(path, f'{label}.time_definition = {shown(definition)}: must be "relative" or "absolute"')
+    stated = [_attribute(point, "time", path, f"{label}, point {k + 2}") for k, point in enumerate(points[1:])]
     times = np.append(0.0, np.cumsum(stated) if definition == "relative" else stated)
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
         k = int(late[0])
         allowed = "greater than 0" if definition == "relative" else f"greater than {times[k]:g}"
-        raise ConfigError(path, f"{place}, point {k + 2}.time = {stated[k]:g}: must be {allowed}")
+        raise ConfigError(path, f"{label}, point {k + 2}.time = {stated[k]:g}: must be {allowed}")
     return times
 
 
-def _values(points: list[Element], tag: str, count: int, path: Path, place: str) -> np.ndarray:
-    return np.array([_vector(point, tag, count, path, f"{place}, point {k + 1}") for k, point in enumerate(points)])
+def _values(points: list[Element], tag: str, count: int, path: Path, label: str) -> np.ndarray:
+    return np.array([_vector(point, tag, count, path, f"{label}, point {k + 1}") for k, point in enumerate(points)])
 
 
-def _vector(point: Element, tag: str, count: int, path: Path, place: str) -> list[float]:
-    words = text_of(child(point, tag, path, place)).split()
+def _vector(point: Element, tag: str, count: int, path: Path, label: str) -> list[float]:
+    words = text_of(child(point, tag, path, label)).split()
     if len(words) != count:
-        raise ConfigError(path, f"{place}.{tag}: {len(words)} numbers: must be {count}, as the joint has coordinates")
-    return [number(word, path, f"{place}.{tag}") for word in words]
+        raise ConfigError(path, f"{label}.{tag}: {len(words)} numbers: must be {count}, as the joint has coordinates")
+    return [number(word, path, f"{label}.{tag}") for word in words]
 
 
-def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path: Path, place: str) -> np.ndarray:
+def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path: Path, label: str) -> np.ndarray:
     # Rates at the points: of the first and the last as they say, else the mean of those of both sides.
     means = np.diff(values, axis=0) / np.diff(times)[:, None]
     ends = [
-        _vector(points[k], "q_dot", values.shape[1], path, f"{place}, point {k % len(points) + 1}") for k in (0, -1)
+        _vector(points[k], "q_dot", values.shape[1], path, f"{label}, point {k % len(points) + 1}") for k in (0, -1)
     ]
     return np.vstack([ends[0], (means[1:] + means[:-1]) / 2.0, ends[1]])
 
@@ -165,7 +165,7 @@ def _check_turns(angles: np.ndarray, path: Path, name: str) -> None:
 
 
 def _curves(
-    element: Element, points: list[Element], times: np.ndarray, values: list[np.ndarray], path: Path, place: str
+    element: Element, points: list[Element], times: np.ndarray, values: list[np.ndarray], path: Path, label: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # Knots, Bernstein coefficients (m, degree + 1, coordinates), and those of the law from rest to rest (m, degree +
     # 1): half of them 0, half of them 1.
@@ -177,16 +177,16 @@ def _curves(
 
 
 def _blends(
-    element: Element, points: list[Element], times: np.ndarray, values: list[np.ndarray], path: Path, place: str
+    element: Element, points: list[Element], times: np.ndarray, values: list[np.ndarray], path: Path, label: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # As `_curves`: a parabola, a line, and a parabola from rest to rest.
     knots, law = [0.0], []
     for k, point in enumerate(points[1:]):
         key, holder = ("blend_time", point) if point.get("blend_time") else ("blend_time_default", element)
-        blend, width = _attribute(holder, key, path, f"{place}, point {k + 2}"), times[k + 1] - times[k]
+        blend, width = _attribute(holder, key, path, f"{label}, point {k + 2}"), times[k + 1] - times[k]
         if not 0.0 < 2.0 * blend < width:
             raise ConfigError(
-                path, f"{place}, point {k + 2}.{key} = {blend:g}: must be greater than 0, and less than {width / 2:g}"
+                path, f"{label}, point {k + 2}.{key} = {blend:g}: must be greater than 0, and less than {width / 2:g}"
             )
         fraction = blend / (2.0 * (width - blend))
         knots += [times[k] + blend, times[k + 1] - blend, times[k + 1]]
@@ -196,7 +196,7 @@ def _blends(
     return np.array(knots), starts[:, None] + laws[:, :, None] * steps[:, None], laws
 
 
-def _turned(
+def _rotating_pieces(
     coordinates: _Coordinates,
     knots: np.ndarray,
     position: np.ndarray,
@@ -211,12 +211,12 @@ def _turned(
         start, axis = Rotation.identity(len(table)), np.tile(np.eye(3)[coordinates.turns[0]], (len(table), 1))
         half = table[:, :, -1] / 2.0
     else:
-        places = Rotation.from_euler(coordinates.order, values[:, -3:])
+        orientations = Rotation.from_euler(coordinates.order, values[:, -3:])
         repeats = len(table) // (len(values) - 1)
-        vectors = np.repeat((places[:-1].inv() * places[1:]).as_rotvec(), repeats, axis=0)
+        vectors = np.repeat((orientations[:-1].inv() * orientations[1:]).as_rotvec(), repeats, axis=0)
         angle = np.linalg.norm(vectors, axis=1, keepdims=True)
         start, axis = (
-            places[np.repeat(np.arange(len(values) - 1), repeats)],
+            orientations[np.repeat(np.arange(len(values) - 1), repeats)],
             vectors / np.where(angle > 0.0, angle, 1.0),
         )
         half = law * angle / 2.0
@@ -230,7 +230,7 @@ def _turned(
         parts *= 2
         if parts > MOST_PARTS or parts * len(table) > MOST_PIECES:
             allowed = f"must turn by less from point to point, so that {MOST_PIECES} polynomial pieces are enough"
-            raise InputError("points", None, allowed, fault=f"{len(values)} of them")
+            raise InputError("points", None, allowed, problem=f"{len(values)} of them")
     before = np.repeat(start.as_quat(scalar_first=True), parts, axis=0)[:, None]
     fine = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(parts) / parts).ravel()
     return np.append(fine, knots[-1]), _split(position, parts), _product(before, pieces)
@@ -245,13 +245,13 @@ def _pieces(half: np.ndarray, axis: np.ndarray, width: np.ndarray) -> tuple[np.n
         return np.concatenate([np.cos(angle)[:, None], np.sin(angle)[:, None] * axis], axis=1)
 
     ends = []
-    for c in (half, half[:, ::-1]):  # derivatives by the share of the piece, from either end
+    for c in (half, half[:, ::-1]):  # derivatives by the fraction of the piece, from either end
         first = degree * (c[:, 1] - c[:, 0])
         second = degree * (degree - 1) * (c[:, min(2, degree)] - 2.0 * c[:, 1] + c[:, 0])
         value, across = unit(c[:, 0]), unit(c[:, 0] + math.pi / 2.0)
-        slope = first[:, None] * across
+        derivative = first[:, None] * across
         second_derivative = second[:, None] * across - (first**2)[:, None] * value
-        ends.append([value, value + slope / 5.0, value + 2.0 * slope / 5.0 + second_derivative / 20.0])
+        ends.append([value, value + derivative / 5.0, value + 2.0 * derivative / 5.0 + second_derivative / 20.0])
     pieces = np.stack([*ends[0], *reversed(ends[1])], axis=1)
     binomials = np.array([1.0, 5.0, 10.0, 10.0, 5.0, 1.0]) / 32.0
     middle = np.array([math.comb(degree, k) for k in range(degree + 1)]) / 2.0**degree

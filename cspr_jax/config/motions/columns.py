@@ -111,9 +111,9 @@ def directives(comments: list[tuple[int, str]], path: Path) -> dict[str, str]:
     """Directives among the comments of a file."""
     values: dict[str, str] = {}
     for line, text in comments:
-        name, mark, value = (part.strip().lower() for part in text.partition(":"))
+        name, separator, value = (part.strip().lower() for part in text.partition(":"))
         name = {"z_axis": "z", "unit": "units"}.get(name, name)
-        if not mark or name not in DIRECTIVES:
+        if not separator or name not in DIRECTIVES:
             continue
         if name != "units" and value not in _VALUES[name]:
             allowed = either(_VALUES[name])
@@ -199,8 +199,8 @@ def _unread(heads: list[str], names: list[str]) -> list[str]:
     for k, head in enumerate(unread[:MOST_SUGGESTIONS]):
         near = nearest(head.partition("[")[0].strip().lower(), [other for other in NAMES if other not in names])
         question = f"did you mean {near}? " if near else ""
-        known = f"known: {', '.join(NAMES)}" if not k else "known: as above"
-        lines.append(f"column {shown(head)} is not read: {question}{known}")
+        names_read = f"known: {', '.join(NAMES)}" if not k else "known: as above"
+        lines.append(f"column {shown(head)} is not read: {question}{names_read}")
     more = len(unread) - MOST_SUGGESTIONS
     return lines + ([f"{more} more column{'s are' if more > 1 else ' is'} not read"] if more > 0 else [])
 
@@ -229,7 +229,7 @@ def _common(units: str, path: Path) -> dict[int, str]:
     return common
 
 
-def _factor(name: str, unit: str, common: dict[int, str], place: str, path: Path) -> float:
+def _factor(name: str, unit: str, common: dict[int, str], label: str, path: Path) -> float:
     table, power = KINDS[KIND_OF[name]]
     if id(table) not in common:
         return 1.0
@@ -240,12 +240,12 @@ def _factor(name: str, unit: str, common: dict[int, str], place: str, path: Path
     if above not in table or bool(below) != bool(power) or (below and below not in TIMES):
         ending = {0: "", 1: "/s", 2: "/s^2"}[power]
         allowed = either([f"{each}{ending}" for each in table])
-        raise ConfigError(path, f"{place}: unit of {name} = {shown(unit)}: must be {allowed}")
+        raise ConfigError(path, f"{label}: unit of {name} = {shown(unit)}: must be {allowed}")
     return table[above] / (TIMES[below] ** power if power else 1.0)
 
 
 def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> None:
-    place = f"line {line}"
+    label = f"line {line}"
     for group, (names, _) in GROUPS.items():
         missing = [name for name in names if name not in result.names]
         if group == "positions" or (group == "times" and has_times) or len(missing) < len(names):
@@ -264,20 +264,20 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
                 called = f", which would have to be called {', '.join(plain)}" if plain and unread else ""
                 raise ConfigError(
                     path,
-                    f"{place}: no column {needed[0]}: {question}must have {', '.join(names)}, found "
+                    f"{label}: no column {needed[0]}: {question}must have {', '.join(names)}, found "
                     f"{_listed(result.heads)}{called}",
                 )
     kinds = [group for group in ("quaternions", "rotations", "tilts") if result.has(group)]
     if len(kinds) > 1:
         first, second = (GROUPS[group][0][0] for group in kinds[:2])
-        raise ConfigError(path, f"{place}: columns {first} and {second}: must be one orientation, not two")
+        raise ConfigError(path, f"{label}: columns {first} and {second}: must be one orientation, not two")
     if result.has("accelerations") and not result.has("velocities"):
-        raise ConfigError(path, f"{place}: column ax without vx: accelerations need velocities beside them")
+        raise ConfigError(path, f"{label}: column ax without vx: accelerations need velocities beside them")
     if not kinds and (result.has("angular_velocities") or result.has("angular_accelerations")):
-        raise ConfigError(path, f"{place}: columns of angular rates: must be beside an orientation, such as qw to qz")
+        raise ConfigError(path, f"{label}: columns of angular rates: must be beside an orientation, such as qw to qz")
 
 
 def _listed(heads: tuple[str, ...]) -> str:
-    # All columns that were found, as far as a line has room.
+    # All columns that were found, as far as a line has space.
     words = ", ".join(shown(head) for head in heads[:MOST_LISTED])
     return words + (f" and {len(heads) - MOST_LISTED} more" if len(heads) > MOST_LISTED else "")

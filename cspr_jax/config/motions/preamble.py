@@ -1,4 +1,4 @@
-"""Lines above the rows of a table: names of columns, units, directives and comments, each looked at once.
+"""Lines above the rows of a table: names of columns, units, directives and comments, each read once.
 
 Names are a line of their own, or else the last comment above the rows that has a name for each column. Where comments
 speak of columns in another way, a line says so, and rows that they contradict are refused.
@@ -13,7 +13,7 @@ from cspr_jax.config.motions.columns import MotionColumns, columns, directives, 
 from cspr_jax.config.motions.heads import NO_UNIT, is_unit, kind_of_unit, mentioned, units_within
 from cspr_jax.errors import ConfigError, shown
 
-MARKS = ("#", "%")
+COMMENT_SIGNS = ("#", "%")
 SEPARATORS = (";", "\t", ",")
 MOST_COLUMNS = 1000
 LARGEST_COMMENTS = 1 << 18  # letters of comments above the rows
@@ -221,7 +221,7 @@ class Preamble:
 
 def is_comment(text: str) -> bool:
     """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted."""
-    return text.lstrip(' \t"').startswith(MARKS)
+    return text.lstrip(' \t"').startswith(COMMENT_SIGNS)
 
 
 def has_content(text: str) -> bool:
@@ -263,7 +263,7 @@ def _empty_at_end(cells: list[str]) -> int:
 
 
 def _readings(text: str, count: int) -> list[list[str]]:
-    # All ways to read a comment as so many words, by its separators, with and without what ends in a colon.
+    # All readings of a comment as so many words, by its separators, with and without what ends in a colon.
     if len(text) > LONGEST_COMMENT:
         return []
     readings = []

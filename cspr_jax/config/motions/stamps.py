@@ -1,21 +1,30 @@
 """Times of tables as they are written: stamps since 1970 have more digits than floats, and tell their unit by them."""
 
+from __future__ import annotations
+
 import re
 from decimal import ROUND_FLOOR, Decimal
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from cspr_jax.config.motions.heads import TIMES
 
-# Whole stamps without a unit that are instants between these, s since 1970, have digits enough to tell their unit.
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Whole stamps without a unit that are times between these, s since 1970, have digits enough to tell their unit.
 EPOCH = (3e8, 5e9)
 UNITS = ("ms", "us", "ns")
 LARGE = 1e6  # floats hold smaller stamps to 1e-10
 LONGEST = 60  # digits
-_WHOLE, _DECIMAL = re.compile(r"[0-9]+"), re.compile(r"[-+]?[0-9]+\.?[0-9]*")
+CLOSER = 100.0  # times closer than others in the median are stamps that nearly repeat
+_DIGITS, _DECIMAL = re.compile(r"[0-9]+"), re.compile(r"[-+]?[0-9]+\.?[0-9]*")
 
 
 def unit_of_stamps(cell: str) -> str | None:
-    """Unit in which a whole number is an instant of our days, but for seconds."""
-    if not _WHOLE.fullmatch(cell) or len(cell) > LONGEST:
+    """Unit in which a whole number is a time of our days, but for seconds."""
+    if not _DIGITS.fullmatch(cell) or len(cell) > LONGEST:
         return None
     return next((unit for unit in UNITS if EPOCH[0] <= float(cell) * TIMES[unit] < EPOCH[1]), None)
 
@@ -34,6 +43,17 @@ class Stamps:
     def shown(self, t: float) -> str:
         """A time as the file has it."""
         return f"{Decimal(repr(t)) + self.offset:f}" if self.offset else repr(t)
+
+
+def near_repeat(times: Float[np.ndarray, "n"]) -> tuple[int, float] | None:
+    """First two stamps that nearly repeat."""
+    steps = np.diff(times)
+    steps = np.where(steps > 0.0, steps, np.inf)
+    if len(steps) < 4:
+        return None
+    i, median = int(np.argmin(steps)), float(np.median(steps))
+    first = int(np.argmax(steps * CLOSER < median))
+    return (first, median / float(steps[first])) if steps[i] * CLOSER < median < np.inf else None
 
 
 def _is_decimal(cell: str) -> bool:

@@ -1,18 +1,27 @@
 """Motions as users bring them: samples over time, or polynomial pieces. SI units and radians."""
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.config.wording import either
 from cspr_jax.errors import InputError
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Vectors between a file with z up and one with z down, by half a turn about x; see `numerics.linear.frames`.
-_TURN = np.array([1.0, -1.0, -1.0])
-_TURN_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
+_FLIP = np.array([1.0, -1.0, -1.0])
+_FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 Z_AXES = ("down", "up")
 # Points of a platform whose positions a motion may have.
 POINTS = ("mass-centre", "origin")
+FAR = 30.0  # sizes of the robot; farther motions are probably in other units
+# Motions of so many rows at whole numbers of seconds are probably in milliseconds, or without units.
+MANY = 50
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,16 +62,16 @@ class MotionTable:
 
     def in_axes(self, z_axis: str) -> "MotionTable":
         """The motion in the axes of a robot file."""
-        if not _is_turned(self.z_axis, z_axis):
+        if not _is_flipped(self.z_axis, z_axis):
             return self
         return dataclasses.replace(
             self,
-            positions=self.positions * _TURN,
-            quaternions=_turned(self.quaternions, _TURN_QUATERNION),
-            velocities=_turned(self.velocities, _TURN),
-            accelerations=_turned(self.accelerations, _TURN),
-            angular_velocities=_turned(self.angular_velocities, _TURN),
-            angular_accelerations=_turned(self.angular_accelerations, _TURN),
+            positions=self.positions * _FLIP,
+            quaternions=_flipped(self.quaternions, _FLIP_QUATERNION),
+            velocities=_flipped(self.velocities, _FLIP),
+            accelerations=_flipped(self.accelerations, _FLIP),
+            angular_velocities=_flipped(self.angular_velocities, _FLIP),
+            angular_accelerations=_flipped(self.angular_accelerations, _FLIP),
             z_axis=z_axis,
         )
 
@@ -91,17 +100,37 @@ class MotionPieces:
 
     def in_axes(self, z_axis: str) -> "MotionPieces":
         """The motion in the axes of a robot file."""
-        if not _is_turned(self.z_axis, z_axis):
+        if not _is_flipped(self.z_axis, z_axis):
             return self
-        quaternion = _turned(self.quaternion, _TURN_QUATERNION)
-        return dataclasses.replace(self, position=self.position * _TURN, quaternion=quaternion, z_axis=z_axis)
+        quaternion = _flipped(self.quaternion, _FLIP_QUATERNION)
+        return dataclasses.replace(self, position=self.position * _FLIP, quaternion=quaternion, z_axis=z_axis)
 
 
-def _is_turned(before: str | None, after: str) -> bool:
+def unit_hints(table: MotionTable, base_points: Float[np.ndarray, "n_cables 3"]) -> list[str]:
+    """Units that a table probably has, other than those that it is read in."""
+    points = np.asarray(base_points, float)
+    extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    distance = float(np.abs(table.positions - points.mean(axis=0)).max())
+    lines = []
+    if distance > FAR * extent:
+        lines.append(
+            f"positions are up to {distance:.3g} m from the spools of a robot of {extent:.3g} m: are they millimetres? "
+            "Then say so: # units: mm"
+        )
+    times = table.times
+    if len(times) > MANY and np.array_equal(times, np.round(times)):
+        lines.append(
+            f"times are whole numbers, from {times[0]:g} to {times[-1]:g} s: are they milliseconds? "
+            "Then say so: # units: ms"
+        )
+    return lines
+
+
+def _is_flipped(before: str | None, after: str) -> bool:
     if after not in Z_AXES:
         raise InputError("z_axis", after, either(Z_AXES))
     return before not in (None, after)
 
 
-def _turned(vectors: np.ndarray | None, signs: np.ndarray) -> np.ndarray | None:
+def _flipped(vectors: np.ndarray | None, signs: np.ndarray) -> np.ndarray | None:
     return None if vectors is None else vectors * signs

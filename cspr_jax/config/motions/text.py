@@ -1,6 +1,6 @@
 """Tables of motions as text, such as CSV: streamed, so that the number of rows is not limited by memory.
 
-Separators are commas, semicolons, tabs or spaces; behind semicolons and tabs decimal commas are taken too. Each fault
+Separators are commas, semicolons, tabs or spaces; behind semicolons and tabs decimal commas are taken too. Each error
 becomes one line with the number of its line in the file and the name of its column.
 """
 
@@ -17,9 +17,8 @@ import numpy as np
 from cspr_jax.config.formats.model import LARGEST_NUMBER
 from cspr_jax.config.motions.columns import MotionColumns
 from cspr_jax.config.motions.heads import TIMES
-from cspr_jax.config.motions.hints import near_repeat
 from cspr_jax.config.motions.preamble import Preamble, cells_of, has_content, is_number, number_of
-from cspr_jax.config.motions.stamps import Stamps, unit_of_stamps
+from cspr_jax.config.motions.stamps import Stamps, near_repeat, unit_of_stamps
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.config.reading import decoded, opened
 from cspr_jax.errors import ConfigError, shown
@@ -33,7 +32,7 @@ WINDOW = 200_000  # rows
 OVERLAP = 100
 # Lengths of quaternions that are taken for unit ones, that are normalised with a note, and that are refused beyond.
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
-MEETING = 1e-6  # share of the size of a motion by which its legs may miss each other
+MEETING = 1e-6  # fraction of the size of a motion by which its legs may miss each other
 
 EMPTY = (",", ";", "\t", " ")  # how lines begin that may have nothing in them
 _COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)
@@ -183,7 +182,7 @@ class _Reader:
         if "%" in plain:
             plain = _COMMENT_LINE.sub("", plain)
         # A search for plain text is far faster than one for a pattern.
-        if plain[:1] in EMPTY or any(f"\n{mark}" in plain for mark in EMPTY):
+        if plain[:1] in EMPTY or any(f"\n{separator}" in plain for separator in EMPTY):
             plain = _EMPTY_LINE.sub("", plain)
         if self.preamble.tail:
             separator = re.escape(str(self.delimiter))
@@ -217,7 +216,7 @@ class _Reader:
             )
 
     def _refuse(self, text: str, line: int) -> None:
-        # Raise an error for the first row that is at fault.
+        # Raise an error for the first row that is wrong.
         heads = self.columns.heads
         for row_number, row in enumerate(text.split("\n"), line):
             if not has_content(row):
@@ -231,9 +230,9 @@ class _Reader:
                 is_split = "," in cell and self.delimiter not in (";", "\t")
                 number = number_of(cell) if name != "t" else number_of(cell) - float(self.stamps.offset)
                 if name and (is_split or not abs(number) <= LARGEST_NUMBER):
-                    place = f"line {row_number}, column {k + 1}: {name}"
+                    label = f"line {row_number}, column {k + 1}: {name}"
                     odd = ", without a comma" if is_split else look_alike(cell[:100])
-                    raise ConfigError(self.path, f"{place} = {shown(cell)}: must be a finite number{odd}")
+                    raise ConfigError(self.path, f"{label} = {shown(cell)}: must be a finite number{odd}")
 
     def _check(self, rows: np.ndarray, text: str, line: int) -> None:
         read = [k for k, name in enumerate(self.columns.names) if name]
@@ -250,8 +249,8 @@ class _Reader:
         for group in ("rotations", "tilts"):
             angles = self.columns.values(group, rows)
             if angles is not None and np.abs(angles).max() > 2.0 * math.pi + 1e-3:
-                reach = np.abs(angles).max()
-                self.notes[f"angles reach {reach:.4g} rad: are they degrees? Then say so: # units: deg"] = None
+                maximum = np.abs(angles).max()
+                self.notes[f"angles reach {maximum:.4g} rad: are they degrees? Then say so: # units: deg"] = None
 
     def _note_scalar(self, quaternions: np.ndarray) -> None:
         first, *_, last = np.abs(quaternions).mean(axis=0)
@@ -298,11 +297,11 @@ class _Reader:
             if values is None or not len(joins):
                 continue
             away = np.abs(values[joins + 1] - values[joins]).max(axis=1)
-            apart = np.flatnonzero(away > MEETING * np.abs(values).max())
-            if len(apart):
-                number = _line_of(text, line, int(joins[apart[0]]) + 1 - before)
-                size = float(away[apart[0]])
-                raise ConfigError(self.path, f"line {number}: {group} jump by {size:g} at one time: must be continuous")
+            jumps = np.flatnonzero(away > MEETING * np.abs(values).max())
+            if len(jumps):
+                number = _line_of(text, line, int(joins[jumps[0]]) + 1 - before)
+                jump = float(away[jumps[0]])
+                raise ConfigError(self.path, f"line {number}: {group} jump by {jump:g} at one time: must be continuous")
 
     def _check_lengths(self, quaternions: np.ndarray, text: str, line: int) -> None:
         sizes = np.linalg.norm(quaternions, axis=1)

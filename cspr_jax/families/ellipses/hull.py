@@ -43,7 +43,7 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
         raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
     if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
         allowed = "must lie in one plane, for a formula of the frequencies"
-        raise InputError("base_points", None, allowed, fault="spools in several planes")
+        raise InputError("base_points", None, allowed, problem="spools in several planes")
     edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
     return SpoolHull(as_float64(edges), as_float64(normal), as_float64(robot.gravity))
 

@@ -179,7 +179,7 @@ class Paths(Leg):
             return course_through(table, places[chosen], None if units is None else units[chosen])
         robot_file = waypoints.robot_file
         if table.orientations is not None and units is None:
-            raise InputError("orientations", None, "must be absent for a point mass", fault="given")
+            raise InputError("orientations", None, "must be absent for a point mass", problem="given")
         has_start = not waypoints.plan_file.is_one_path and not (
             run.first == 0 and table.has_start and waypoints.poses[0].position is None and not waypoints.poses[0].rest
         )
@@ -240,7 +240,7 @@ def _cells(course: Course, grid: int) -> int:
     if cells > MOST_CELLS:
         error = f"{_parts(len(course.tracks))}: {cells:,} cells"
         allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
-        raise InputError("grid", None, allowed, fault=error)
+        raise InputError("grid", None, allowed, problem=error)
     return cells
 
 

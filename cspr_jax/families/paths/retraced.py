@@ -143,7 +143,7 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
     start, end = np.where(at_rest, 0.0, np.linalg.norm(ends.velocity[:, :AXES], axis=1)).tolist()
     if ((np.array([start, end]) <= TURNS * ends.speed) & ~at_rest).any():
         name = f"segment {numbers[0] + 1}"
-        raise InputError(name, None, "must move its mass centre where it begins and ends", fault="it turns in place")
+        raise InputError(name, None, "must move its mass centre where it begins and ends", problem="it turns in place")
     return Retraced(
         section=Section(curve, np.array([_feed(motions, part, feeds) for part in parts])[pieces.number], marks),
         segments=numbers[is_mark],

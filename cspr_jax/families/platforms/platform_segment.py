@@ -231,7 +231,7 @@ class PlatformMotion:
         return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, batch_size=BATCH)
 
 
-@persistent_jit(static_argnames="kind", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="kind", compiler_options=compile_options.proof_options())
 def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
     return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
 

@@ -74,10 +74,12 @@ def function_motion(
     try:
         size = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
     except TypeError as error:
-        raise InputError("times", None, "must be one of jax.numpy", fault="jax cannot follow it") from error
+        raise InputError("times", None, "must be one of jax.numpy", problem="jax cannot follow it") from error
     allowed = ((3,), (7,)) if is_platform else ((3,),)
     if size not in allowed:
-        raise InputError("times", None, f"must give values of shape {' or '.join(map(str, allowed))}", fault=f"{size}")
+        raise InputError(
+            "times", None, f"must give values of shape {' or '.join(map(str, allowed))}", problem=f"{size}"
+        )
     back = jnp.asarray(reference * np.array([1.0, -1.0, -1.0, -1.0]))
 
     def inward(t: Array) -> Array:

@@ -7,8 +7,7 @@ import numpy as np
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
-from cspr_jax.config.motions.hints import unit_hints
-from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.config.motions.table import MotionPieces, MotionTable, unit_hints
 from cspr_jax.curves.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.curves.noise import noise_notes

@@ -245,7 +245,7 @@ class Hypocycloid:
         return in_batches(partial(_bounds, self.segment, self.arcs), blocks, batch_size=BATCH)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
     return jax.vmap(partial(_block_bounds, segment, arcs))(blocks)
 

@@ -34,7 +34,7 @@ THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
 # the mass and the size squared, as little as MuJoCo takes well; distance of the points that keep it in the plane of its
 # cable, over the size.
 LEAD, WHEEL_WIDTH, SWIVEL_INERTIA, FOLLOWING = 0.5, 0.15, 1e-9, 0.1
-ROOM = 0.01  # rad, between start and end of a tendon around a pulley
+SMALLEST_GAP = 0.01  # rad, between start and end of a tendon around a pulley
 LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # from z to -y
 CLEAR = (0.0, 0.0, 0.0, 0.0)
 DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
@@ -54,23 +54,23 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense", **solver)
     if control_file:
         _add(_add(root, "custom"), "text", name="control_file", data=control_file)
-    places = np.vstack([body.spools, moved.position])
-    low, high = places.min(0), places.max(0)
-    size = float(np.linalg.norm(high - low))
-    _add(root, "statistic", center=0.5 * (low + high), extent=size)
+    points = np.vstack([body.spools, moved.position])
+    low, high = points.min(0), points.max(0)
+    extent = float(np.linalg.norm(high - low))
+    _add(root, "statistic", center=0.5 * (low + high), extent=extent)
     _add(_add(root, "visual"), "headlight", ambient=[0.4] * 3, diffuse=[0.5] * 3, specular=[0.1] * 3)
     sky = {"type": "skybox", "builtin": "gradient", "width": "64", "height": "64"}
     _add(assets := _add(root, "asset"), "texture", **sky, rgb1=[1.0] * 3, rgb2=[0.8, 0.85, 0.9])
     if isinstance(body.body, Hull):
         _add(assets, "mesh", name=HULL, vertex=np.unique(body.body.triangles.reshape(-1, 3), axis=0))
-    _world(_add(root, "worldbody"), body, moved, size)
+    _world(_add(root, "worldbody"), body, moved, extent)
     tendons = _add(root, "tendon")
-    _cables(tendons, body, size)
+    _cables(tendons, body, extent)
     if len(body.wheels):
         _followers(tendons, _add(root, "equality"), body, step)
     _motors(_add(root, "actuator"), body, moved)
-    places, rates, _ = (rows[0] for rows in coordinates(body, moved))
-    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=places, qvel=rates, ctrl=moved.tension[0])
+    qpos, qvel, _ = (rows[0] for rows in coordinates(body, moved))
+    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=qpos, qvel=qvel, ctrl=moved.tension[0])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -84,24 +84,24 @@ def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Ele
     return ElementTree.SubElement(parent, tag, text)
 
 
-def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+def _world(world: ElementTree.Element, body: Suspended, moved: Played, extent: float) -> None:
     spools = body.spools.copy()
     if body.pulleys is not None:
         spools -= LEAD * (np.asarray(body.pulleys.radius)[:, None] * np.asarray(body.pulleys.axes))
     for k, spool in enumerate(spools, 1):
-        _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * size, rgba=DARK)
+        _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * extent, rgba=DARK)
     drawn = {"contype": "0", "conaffinity": "0"}
     for number, obstacle in enumerate(body.obstacles, 1):
         _add(world, "geom", name=f"obstacle_{number}", rgba=BROWN, **drawn, **_geom(obstacle))
     start = moved.position[0]
     if body.axes:
         effector = _add(world, "body", name="effector", pos=start)
-        for axis in body.axes:  # coordinates are places, not ways from the start
+        for axis in body.axes:  # coordinates are positions, not displacements from the start
             _add(effector, "joint", name="xyz"[axis], type="slide", axis=np.eye(3)[axis], ref=start[axis])
     else:
         effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:7])
         _add(effector, "freejoint", name="pose")
-    radius = MASS_RADIUS * size
+    radius = MASS_RADIUS * extent
     # An end effector that does not turn may have any inertia, but it must have one.
     moments, axes = _principal(0.4 * body.mass * radius**2 * np.eye(3) if body.inertia is None else body.inertia)
     quaternion = np.roll(axes.as_quat(), 1)
@@ -114,19 +114,19 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
     for point in np.unique(body.points, axis=0):
         if np.linalg.norm(point) > radius:
             rod = np.concatenate([np.zeros(3), point])
-            _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * size, **drawn)
+            _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * extent, **drawn)
     for k, point in enumerate(body.points, 1):
-        _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * size, rgba=ORANGE)
+        _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * extent, rgba=ORANGE)
     # Behind the effector, whose coordinates are the first ones.
     if len(body.wheels):
-        _pulleys(world, body, moved, size)
+        _pulleys(world, body, moved, extent)
 
 
-def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, extent: float) -> None:
     # Each swivels about its axis at the entry point, the x axis of its body towards its centre.
     axes, radii = np.asarray(body.pulleys.axes), np.asarray(body.pulleys.radius)  # type: ignore[union-attr]
     points, middles = attachments(body, moved)[0], _sides(body, moved)
-    inertia = np.full(3, SWIVEL_INERTIA * body.mass * size**2)
+    inertia = np.full(3, SWIVEL_INERTIA * body.mass * extent**2)
     for k, middle in zip(body.wheels.tolist(), middles.tolist(), strict=True):
         across = np.cross(axes[k], points[k] - body.spools[k])
         across = across / np.linalg.norm(across)
@@ -138,10 +138,10 @@ def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, size: f
         wheel = {"type": "cylinder", "size": [radii[k], WHEEL_WIDTH * radii[k]], "quat": LYING, "rgba": DARK}
         _add(pulley, "geom", name=f"wheel_{k + 1}", pos=centre, contype="0", conaffinity="0", **wheel)
         side = 2.0 * radii[k] * np.array([-np.cos(middle), 0.0, np.sin(middle)])
-        _add(pulley, "site", name=f"side_{k + 1}", pos=centre + side, size=THINNEST * size, rgba=CLEAR)
-        for name, way in (("left", 1.0), ("right", -1.0)):
-            arm = [0.0, way * FOLLOWING * size, 0.0]
-            _add(pulley, "site", name=f"{name}_{k + 1}", pos=arm, size=THINNEST * size, rgba=CLEAR)
+        _add(pulley, "site", name=f"side_{k + 1}", pos=centre + side, size=THINNEST * extent, rgba=CLEAR)
+        for name, side_sign in (("left", 1.0), ("right", -1.0)):
+            arm = [0.0, side_sign * FOLLOWING * extent, 0.0]
+            _add(pulley, "site", name=f"{name}_{k + 1}", pos=arm, size=THINNEST * extent, rgba=CLEAR)
 
 
 def _sides(body: Suspended, moved: Played) -> np.ndarray:
@@ -149,9 +149,12 @@ def _sides(body: Suspended, moved: Played) -> np.ndarray:
     # right way around: less than half a turn behind the start of the tendon, and before its end, in all rows.
     axes, radii = (np.asarray(x)[body.wheels] for x in (body.pulleys.axes, body.pulleys.radius))  # type: ignore[union-attr]
     with double_precision():
-        way = _EXITS(body.spools[body.wheels], axes, radii, attachments(body, moved)[:, body.wheels])
-    start, end = -np.arctan(LEAD), np.max(np.asarray(way.wrapped) / radii + np.arctan2(way.free, radii), axis=0)
-    lost = np.flatnonzero(~(end - start < 2.0 * np.pi - ROOM))
+        exits_of_cables = _EXITS(body.spools[body.wheels], axes, radii, attachments(body, moved)[:, body.wheels])
+    start, end = (
+        -np.arctan(LEAD),
+        np.max(np.asarray(exits_of_cables.wrapped) / radii + np.arctan2(exits_of_cables.free, radii), axis=0),
+    )
+    lost = np.flatnonzero(~(end - start < 2.0 * np.pi - SMALLEST_GAP))
     if len(lost):
         error = f"MuJoCo cannot wrap cable {int(body.wheels[lost[0]]) + 1} around its pulley all along its motion"
         raise ConfigError("plan", f"has no model for MuJoCo: {error}")
@@ -179,9 +182,9 @@ def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:
     return moments, Rotation.from_matrix(axes * np.linalg.det(axes))
 
 
-def _cables(tendons: ElementTree.Element, body: Suspended, size: float) -> None:
-    known = body.cable_diameter
-    radius = CABLE_RADIUS * size if known is None else max(0.5 * known, THINNEST * size)
+def _cables(tendons: ElementTree.Element, body: Suspended, extent: float) -> None:
+    diameter = body.cable_diameter
+    radius = CABLE_RADIUS * extent if diameter is None else max(0.5 * diameter, THINNEST * extent)
     for k in range(1, len(body.spools) + 1):
         cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE)
         _add(cable, "site", site=f"spool_{k}")
@@ -202,7 +205,7 @@ def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body
 
 
 def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
-    # A positive control shortens the cable; no cable pushes. Without a limit there is room for a controller.
+    # A positive control shortens the cable; no cable pushes. Without a limit there is a reserve for a controller.
     maximum = np.maximum(moved.tension.max(0), 0.0)
     largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * maximum.max()), maximum)
     for k, tension in enumerate(largest.tolist(), 1):

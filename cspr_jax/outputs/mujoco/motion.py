@@ -112,8 +112,8 @@ class Played:
         if self.rotation is None or self.omega is None or self.omega_dot is None:
             chosen = list(axes)
             return self.position[:, chosen], self.velocity[:, chosen], self.acceleration[:, chosen]
-        places = np.hstack([self.position, np.roll(self.rotation.as_quat(), 1, axis=1)])  # SciPy: scalar last
-        return places, np.hstack([self.velocity, self.omega]), np.hstack([self.acceleration, self.omega_dot])
+        qpos = np.hstack([self.position, np.roll(self.rotation.as_quat(), 1, axis=1)])  # SciPy: scalar last
+        return qpos, np.hstack([self.velocity, self.omega]), np.hstack([self.acceleration, self.omega_dot])
 
 
 def upward(z_axis: str) -> Frame:
@@ -135,7 +135,7 @@ def suspended(plan: PlannedMotions) -> Suspended:
     pulleys = robot.pulleys
     if pulleys is not None:
         pulleys = Pulleys(pulleys.radius, as_float64(world.rotated(plan.frame.rotated(np.asarray(pulleys.axes)))))
-    limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
+    limits = [getattr(spec, "tension_max", None) for spec in (plan.keys, written)]
     limit = next((value for value in limits if value is not None), np.inf)
     return Suspended(
         name=plan.robot_file.name,
@@ -178,9 +178,9 @@ def coordinates(
     body: Suspended, moved: Played
 ) -> tuple[Float[np.ndarray, "n nq"], Float[np.ndarray, "n nv"], Float[np.ndarray, "n nv"]]:
     """Coordinates of all of MuJoCo's joints, their velocities and accelerations."""
-    places, rates, accelerations = moved.coordinates(body.axes)
+    qpos, rates, accelerations = moved.coordinates(body.axes)
     if body.pulleys is None or not len(body.wheels):
-        return places, rates, accelerations
+        return qpos, rates, accelerations
     speeds = np.repeat(moved.velocity[:, None], len(body.points), axis=1)
     if moved.rotation is not None and moved.omega is not None:
         swing = np.cross(moved.omega[:, None], body.points[None])
@@ -191,7 +191,7 @@ def coordinates(
     first = across[0] / np.linalg.norm(across[0], axis=1, keepdims=True)
     angles = np.arctan2(-np.sum(across * np.cross(first, axes), axis=2), np.sum(across * first, axis=2))
     turning = np.sum(across * speeds[:, body.wheels], axis=2) / np.sum(across**2, axis=2)
-    both = zip((places, rates, accelerations), (angles, turning, np.zeros_like(turning)), strict=True)
+    both = zip((qpos, rates, accelerations), (angles, turning, np.zeros_like(turning)), strict=True)
     return tuple(np.hstack(pair) for pair in both)  # type: ignore[return-value]
 
 
@@ -203,7 +203,7 @@ def played(plan: PlannedMotions, step: float = STEP) -> Played:
         raise ConfigError("plan", "cannot be played: a segment has no motion; see its verdict")
     if 2.0 * plan.answers.duration.sum() / step > LARGEST_ROWS:
         raise ConfigError("--step", f"{step:g} s: must give at most {LARGEST_ROWS} rows, two a step")
-    taus, times = _instants(plan, step)
+    taus, times = _step_times(plan, step)
     columns, segment = rows_at(plan, taus), np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
     columns |= {"t": times, "tension": columns["tension" if plan.robot_file.pairs is None else "tension_each"]}
     if not all(np.isfinite(columns[name]).all() for name in ("tension", "position", "acceleration")):
@@ -227,7 +227,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 
 
-def _instants(plan: PlannedMotions, step: float) -> tuple[list[np.ndarray], np.ndarray]:
+def _step_times(plan: PlannedMotions, step: float) -> tuple[list[np.ndarray], np.ndarray]:
     # Return the normalised times of each segment, and all times: rows on either side of a jump have the same time.
     taus, times, start = [], [], 0.0
     for motion, length in zip(plan.motions, plan.answers.duration.tolist(), strict=True):

@@ -93,8 +93,8 @@ class PlayedPlan:
 
     def _largest(self, values: np.ndarray, units: str) -> dict[str, Any]:
         row = int(values.argmax())
-        place = {"t": float(self.time[row]), "segment": int(self.segment[row])}
-        return {"value": float(values[row]), "units": units, **place}
+        where = {"t": float(self.time[row]), "segment": int(self.segment[row])}
+        return {"value": float(values[row]), "units": units, **where}
 
     def lines(self) -> list[str]:
         """The largest deviations for people."""
@@ -103,15 +103,15 @@ class PlayedPlan:
         for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
             far, turn = deviations[f"path{name}"], deviations[f"turn{name}"]
             angle = f" and {two_digits(turn['value'])} rad" if self.played.rotated.any() else ""
-            text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
+            text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_time_text(far)}")
         maximum = deviations["tension"]
         text.append(
-            f"tensions: at most {two_digits(maximum['value'])} N off, cable {maximum['cable']}, {_place(maximum)}"
+            f"tensions: at most {two_digits(maximum['value'])} N off, cable {maximum['cable']}, {_time_text(maximum)}"
         )
         return text
 
 
-def _place(deviation: dict[str, Any]) -> str:
+def _time_text(deviation: dict[str, Any]) -> str:
     return f"at {deviation['t']:.2f} s in segment {deviation['segment']}"
 
 
@@ -120,8 +120,8 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
     mujoco = need_mujoco()
     body, moved = suspended(plan), played(plan, step)
     rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
-    ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
-    by_segment_path, through = (way._replace(position=world.rotated(way.position)) for way in ways)
+    paths = [path_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
+    by_segment_path, through = (path._replace(position=world.rotated(path.position)) for path in paths)
     return PlayedPlan(
         robot=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -142,13 +142,13 @@ def ends_of_steps(moved: Played) -> Int[np.ndarray, "n"]:
     return np.concatenate([np.asarray(run[::2]) for run in moved.runs()])
 
 
-def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
+def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
     """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator."""
     mujoco = need_mujoco()
-    places, rates, _ = coordinates(body, moved)
+    qpos, rates, _ = coordinates(body, moved)
     reached, row = [], 0
 
-    def pull(model: Any, data: Any) -> None:
+    def control(model: Any, data: Any) -> None:
         # RK4 asks at the start of a step, twice in its middle, and at its end.
         data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
 
@@ -156,16 +156,16 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)
-        mujoco.set_mjcb_control(pull)
+        mujoco.set_mjcb_control(control)
         for run in moved.runs():
             if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
-                data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
+                data.qpos[:], data.qvel[:] = qpos[run.start], rates[run.start]
             reached.append(data.qpos.copy())
             for row in run[:-1:2]:
                 data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
                 mujoco.mj_step(model, data)
                 reached.append(data.qpos.copy())
-    return _way(moved, np.array(reached), body.axes)
+    return _played_path(moved, np.array(reached), body.axes)
 
 
 @contextlib.contextmanager
@@ -180,7 +180,7 @@ def _callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def _way(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+def _played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     rows = ends_of_steps(moved)
     position, rotated = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
@@ -199,15 +199,15 @@ def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_
     # Pulleys are where the cables want them: what keeps them there has nothing to do.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
     rows, freedoms = ends_of_steps(moved), model.nv - len(body.wheels)
-    data, (places, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)
-    pulls, forces = np.empty((len(rows), freedoms, model.nu)), np.empty((len(rows), freedoms))
+    data, (qpos, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)
+    jacobians, forces = np.empty((len(rows), freedoms, model.nu)), np.empty((len(rows), freedoms))
     for i, row in enumerate(rows.tolist()):
-        data.qpos[:], data.qvel[:], data.qacc[:] = places[row], rates[row], accelerations[row]
+        data.qpos[:], data.qvel[:], data.qacc[:] = qpos[row], rates[row], accelerations[row]
         mujoco.mj_inverse(model, data)
         # A cable that shortens pulls.
-        pulls[i], forces[i] = -_tendons(model, data)[: model.nu, :freedoms].T, data.qfrc_inverse[:freedoms]
-    missing = forces - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
-    return np.einsum("nji,ni->nj", np.linalg.pinv(pulls), missing)
+        jacobians[i], forces[i] = -_tendons(model, data)[: model.nu, :freedoms].T, data.qfrc_inverse[:freedoms]
+    missing = forces - np.einsum("nij,nj->ni", jacobians, moved.tension[rows])
+    return np.einsum("nji,ni->nj", np.linalg.pinv(jacobians), missing)
 
 
 def _tendons(model: Any, data: Any) -> np.ndarray:

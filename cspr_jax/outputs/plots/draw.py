@@ -19,9 +19,8 @@ from cspr_jax.outputs.plots.maps.frequencies import (
     turns_in_words,
 )
 from cspr_jax.outputs.plots.maps.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
-from cspr_jax.outputs.plots.maps.planes import in_order
 from cspr_jax.outputs.plots.maps.ratio import ratio_of
-from cspr_jax.outputs.plots.maps.sections import POLAR, PlaneSection, section_figure, tells
+from cspr_jax.outputs.plots.maps.sections import POLAR, PlaneSection, in_order, section_figure, tells
 from cspr_jax.outputs.plots.maps.solid import SPACE, is_solid, solid_figure
 from cspr_jax.outputs.plots.motions.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motions.motion_pictures import motion_picture
@@ -41,7 +40,7 @@ class MapView(NamedTuple):
         excluded: of data's shape, the cells that are excluded by other conditions than that of the quantity.
         across: axes that vary.
         fixed: words for the fixed axes.
-        place: the axes that were fixed, and where.
+        coordinates: of the axes that were fixed.
     """
 
     name: str
@@ -49,7 +48,7 @@ class MapView(NamedTuple):
     excluded: np.ndarray
     across: list[str]
     fixed: list[str]
-    place: dict[str, float]
+    coordinates: dict[str, float]
 
 
 def drawn(
@@ -137,7 +136,7 @@ def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dic
     chosen_points = {axis: nearest(result, axis, coordinate) for axis, coordinate in at.items()}
     others = {axis: (0, first_of(result, axis)) for axis in result.axes if axis not in across}
     point_of_axis = others | chosen_points
-    return {axis: place for axis, (place, _) in point_of_axis.items()}, [words for _, words in point_of_axis.values()]
+    return {axis: i for axis, (i, _) in point_of_axis.items()}, [words for _, words in point_of_axis.values()]
 
 
 def _overlay(
@@ -189,10 +188,10 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     order = in_order(result, view.across)
     view = _panelled(result, view, order)
     data, hatched, panels = view.data, view.excluded, view.across[2] if len(view.across) > 2 else None
-    says = _telling_cells(result, at, order) if tuple(view.across[:2]) == POLAR else None
+    says = _informative_cells(result, at, order) if tuple(view.across[:2]) == POLAR else None
     if not panels:
         data, hatched, says = data[..., None], hatched[..., None], None if says is None else says[..., None]
-    section = PlaneSection(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
+    section = PlaneSection(view.name, view.across[:2], panels, view.coordinates, _constant(result, view), hatched)
     figure = section_figure(result, section, data, says)
     if view.across[1:] == ["frequency"] and set(SHOWN) <= set(result.data):
         first = at | {"frequency": float(result.axes["frequency"][0])}
@@ -201,15 +200,15 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
 
 
 def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:
-    fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
+    fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.coordinates])
     return [*said(result), *turns_in_words(result, view.name), *fixed]
 
 
-def _telling_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
+def _informative_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
     # The answer is the same for every quantity of a file, so that their pictures show the same sections.
     names = ["verdict"] if "verdict" in result.data else list(result.data)
-    telling = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
-    return np.any(telling, axis=0)
+    informative = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    return np.any(informative, axis=0)
 
 
 def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
@@ -234,26 +233,26 @@ def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
 def _panelled(result: Result, view: MapView, order: list[str]) -> MapView:
     # Keep at most three axes, in this order; the others are at their first point.
     data, hatched = (x.transpose([view.across.index(axis) for axis in order]) for x in (view.data, view.excluded))
-    fixed, place = list(view.fixed), dict(view.place)
+    fixed, coordinates = list(view.fixed), dict(view.coordinates)
     for extra in order[3:]:
         data, hatched = data[:, :, :, 0], hatched[:, :, :, 0]
-        place[extra] = float(result.axes[extra][0])
+        coordinates[extra] = float(result.axes[extra][0])
         fixed.append(first_of(result, extra))
-    return MapView(view.name, data, hatched, order[:3], fixed, place)
+    return MapView(view.name, data, hatched, order[:3], fixed, coordinates)
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> MapView:
     name = quantity or shown_first(result)
     if name not in result.data:
         raise InputError("--quantity", name, one_of(name, sorted(result.data)))
-    fixed, place = [], {}
+    fixed, indices = [], {}
     for axis, coordinate in at.items():
-        place[axis], words = nearest(result, axis, coordinate)
+        indices[axis], words = nearest(result, axis, coordinate)
         fixed.append(words)
-    across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
+    across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in indices]
     if not across:
-        counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}
+        counts = {axis: 1 if axis in indices else len(points) for axis, points in result.axes.items()}
         raise InputError("axes", counts, "one with more than one point")
-    part = tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)
-    places = {axis: float(result.axes[axis][i]) for axis, i in place.items()}
-    return MapView(name, result.data[name][part], excluded(result, name)[part], across, fixed, places)
+    part = tuple(slice(None) if axis in across else indices.get(axis, 0) for axis in result.axes)
+    coordinates_of_axes = {axis: float(result.axes[axis][i]) for axis, i in indices.items()}
+    return MapView(name, result.data[name][part], excluded(result, name)[part], across, fixed, coordinates_of_axes)

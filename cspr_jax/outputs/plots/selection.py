@@ -32,7 +32,7 @@ def is_own_motion(path: Path) -> bool:
         return not file.readline(LONGEST_NAMES).removeprefix(b"\xef\xbb\xbf").startswith(b"t,position_x,")
 
 
-def places(words: list[str], option: str = "--at") -> dict[str, float]:
+def coordinates_of(words: list[str], option: str = "--at") -> dict[str, float]:
     """Values of axes as the command line gives them."""
     at = {}
     for text in words:
@@ -56,8 +56,8 @@ def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") 
     if not low - rounding <= coordinate <= high + rounding:
         allowed = f"{axis} in [{low:.6g}, {high:.6g}]" if high > low else f"{axis} = {low:.6g}, its one point"
         raise InputError(option, f"{axis}={coordinate:.6g}", allowed)
-    place = int(np.argmin(np.abs(points - coordinate)))
-    words = value(result, axis, points[place])
-    if abs(points[place] - coordinate) > rounding:
+    index = int(np.argmin(np.abs(points - coordinate)))
+    words = value(result, axis, points[index])
+    if abs(points[index] - coordinate) > rounding:
         words += f" (nearest to {value(result, axis, coordinate).partition(' = ')[2]})"
-    return place, words
+    return index, words

@@ -118,7 +118,7 @@ def scene(
     if (diameters.ndim and diameters.shape != (len(base),)) or not (np.isfinite(diameters) & (diameters >= 0.0)).all():
         raise InputError("diameter", diameter, f"one length, or {len(base)}, not negative")
     if body is not None and not isinstance(robot, PlatformRobot):
-        raise InputError("body", None, "must be None", fault="a point mass has no shape")
+        raise InputError("body", None, "must be None", problem="a point mass has no shape")
     if leave is None:
         extent = 0.0 if body is None else float(np.ptp(_corners(body), axis=0).max())
         leave = max(LEAVE_DIAMETERS * float(diameters.max()), LEAVE_FRACTION * extent)
@@ -177,12 +177,12 @@ class _CheckedPoses(NamedTuple):
 def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
     points = np.asarray(positions, float)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {points.shape}")
+        raise InputError("positions", None, "must be (n, 3)", problem=f"an array of shape {points.shape}")
 
     def checked(name: str, values, shape: tuple[int, ...]) -> np.ndarray | None:
         array = None if values is None else np.asarray(values, float)
         if array is not None and array.shape != shape:
-            raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
+            raise InputError(name, None, f"must be {shape}", problem=f"an array of shape {array.shape}")
         return array
 
     quaternion = checked("quaternions", quaternions, (len(points), 4))

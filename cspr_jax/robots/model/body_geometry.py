@@ -33,7 +33,7 @@ def checked_platform(platform_points, count: int, pattern: Pattern) -> Float[np.
     points = checked_coordinates("platform_points", platform_points, pattern.dof)
     if len(points) != count:
         raise InputError(
-            "platform_points", None, f"must be {count}, as many as base_points", fault=f"{len(points)} points"
+            "platform_points", None, f"must be {count}, as many as base_points", problem=f"{len(points)} points"
         )
     if pattern.is_planar:
         if (points[:, 1] != 0.0).any():

@@ -80,7 +80,7 @@ def parallel_pairs(base_points, platform_points) -> ParallelPairs:
 
 
 def _error(words: str) -> InputError:
-    return InputError("platform_points", None, ALLOWED, fault=words)
+    return InputError("platform_points", None, ALLOWED, problem=words)
 
 
 def _matched(offsets: np.ndarray, tolerance: float) -> np.ndarray:

@@ -175,7 +175,7 @@ def checked_coordinates(key: str, coordinates, count: int) -> Float[np.ndarray, 
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
         raise InputError(key, coordinates, f"{count} points or more of three coordinates, at most 1e6 m")
     if len(points) < count:
-        raise InputError(key, coordinates, f"must be {count} or more, one a cable", fault=f"{len(points)} points")
+        raise InputError(key, coordinates, f"must be {count} or more, one a cable", problem=f"{len(points)} points")
     return points
 
 

@@ -84,7 +84,7 @@ def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
         raise InputError("pattern", robot.pattern, f"{allowed} (what is asked for does not exist yet for others)")
     if robot.pulleys is not None and not pulleys:
         raise InputError(
-            "pulley_radius", None, "must be absent (what is asked for does not exist yet for them)", fault="pulleys"
+            "pulley_radius", None, "must be absent (what is asked for does not exist yet for them)", problem="pulleys"
         )
 
 
@@ -96,5 +96,5 @@ def check_determined(robot: Robot, *, pulleys: bool = False) -> None:
             "base_points",
             None,
             f"must be {robot.dof} (what is asked for does not exist yet for more cables than degrees of freedom)",
-            fault=f"{robot.n_cables} points",
+            problem=f"{robot.n_cables} points",
         )

@@ -92,13 +92,13 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     pose = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
     if not wrench_balance.is_regular(abs(determinant)):
         error = f"{pose} is singular (determinant {determinant:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
-        raise InputError("platform_points", None, _CHANGE_LINES, fault=error + _free(rotated, center))
+        raise InputError("platform_points", None, _CHANGE_LINES, problem=error + _free(rotated, center))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
         fraction = tensions / np.abs(tensions).mean()
     if not (np.isfinite(fraction) & (fraction > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(fraction), fraction, -np.inf)))
         error = f"in {pose} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
-        raise InputError("platform_points", None, _CHANGE_LOAD, fault=error)
+        raise InputError("platform_points", None, _CHANGE_LOAD, problem=error)
     return Reference(rotated, rotation, float(determinant), fraction)
 
 

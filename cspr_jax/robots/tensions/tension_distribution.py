@@ -131,7 +131,7 @@ def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof
     """All tensions that give a wrench."""
     dof, count = matrix.shape
     if count < dof:
-        raise InputError("matrix", None, f"must be {dof} or more, one a cable", fault=f"{count} columns")
+        raise InputError("matrix", None, f"must be {dof} or more, one a cable", problem=f"{count} columns")
     frame, along, left = _frame(matrix, wrench)
     return AllTensions(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
 

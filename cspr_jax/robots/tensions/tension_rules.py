@@ -251,14 +251,17 @@ def distributions(
     matrix, wrench = np.asarray(matrices, float), np.asarray(wrenches, float)
     if matrix.ndim != 3 or wrench.shape != matrix.shape[:2]:
         raise InputError(
-            "wrenches", None, "must be (n, dof) of matrices (n, dof, n_cables)", fault=f"{matrix.shape}, {wrench.shape}"
+            "wrenches",
+            None,
+            "must be (n, dof) of matrices (n, dof, n_cables)",
+            problem=f"{matrix.shape}, {wrench.shape}",
         )
     count, _, cables = matrix.shape
     low, high = (_each(*x, (count, cables)) for x in (("tension_min", tension_min), ("tension_max", tension_max)))
     arguments = [matrix, wrench, low, high]
     if RULES[rule].is_bounded and not np.isfinite(high).all():
         raise InputError(
-            "tension_max", None, f"must be finite with rule {rule}", fault="a cable without a largest tension"
+            "tension_max", None, f"must be finite with rule {rule}", problem="a cable without a largest tension"
         )
     if rule == "p-norm":
         if not MIN_EXPONENT <= exponent <= MAX_EXPONENT:
@@ -293,5 +296,5 @@ def _least_norms(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: 
 def _each(name: str, values, shape: tuple[int, int]) -> np.ndarray:
     array = np.asarray(values, float)
     if array.shape not in ((), shape[1:], shape):
-        raise InputError(name, None, f"must be {shape[1:]} or {shape}", fault=f"an array of shape {array.shape}")
+        raise InputError(name, None, f"must be {shape[1:]} or {shape}", problem=f"an array of shape {array.shape}")
     return np.ascontiguousarray(np.broadcast_to(array, shape))

@@ -13,10 +13,10 @@ from pathlib import Path
 from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.files.disk import Disk, write_all
 
-_MARK = b"\ncspr_jax, sha256 of all before this line: "
-LENGTH = len(_MARK) + 64 + 1
+_PREFIX = b"\ncspr_jax, sha256 of all before this line: "
+LENGTH = len(_PREFIX) + 64 + 1
 _STEP = 1 << 20
-UNSEALED = "it is not whole, or not of cspr"
+NO_TRAILER = "it is not whole, or not of cspr"
 
 
 # These errors mean that nothing is there, or that it is no file. Every other refusal comes from the system or the disk,
@@ -36,25 +36,25 @@ def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
     return StoreError(printable(f"{path}: cannot be read: {reason}; mend that, or remove the file, and run again"))
 
 
-def sealed(data: bytes) -> bytes:
-    """Data with their seal."""
+def with_trailer(data: bytes) -> bytes:
+    """Data with their checksum trailer."""
     return data + _line(hashlib.sha256(data).hexdigest())
 
 
-def seal_of(data: bytes) -> bytes:
-    """The seal at the end of data."""
+def trailer_of(data: bytes) -> bytes:
+    """The checksum trailer at the end of data."""
     return data[-LENGTH:]
 
 
-def seal_file(disk: Disk, file: int, size: int) -> None:
-    """Seal a file that is open."""
-    write_all(disk, file, _line(_hash(file, size)), size)
+def write_trailer(disk: Disk, file: int, length: int) -> None:
+    """Write the checksum trailer of a file that is open."""
+    write_all(disk, file, _line(_hash(file, length)), length)
 
 
 def open_regular(path: Path, *, follow: bool = True) -> int:
     """Open a file for reading, and only a file: a pipe would keep its reader waiting."""
     try:
-        # Opening a device can do something to it, so it is looked at before, and again against a change between.
+        # Opening a device can do something to it, so its kind is checked before, and again against a change between.
         if not stat.S_ISREG(os.stat(path, follow_symlinks=follow).st_mode):
             raise DamagedError("it is not a file")
         how = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY | (0 if follow else os.O_NOFOLLOW)
@@ -69,65 +69,65 @@ def open_regular(path: Path, *, follow: bool = True) -> int:
     return file
 
 
-def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
+def read_regular(path: Path, maximum: int, *, last: bool = False) -> bytes:
     """Content of a file of a run directory, which is no link."""
     file = open_regular(path, follow=False)
     try:
-        size = os.fstat(file).st_size
-        if size > most and not last:
+        length = os.fstat(file).st_size
+        if length > maximum and not last:
             raise DamagedError("it is not a file of a fitting size")
-        return _bytes_of(file, min(size, most), max(size - most, 0))
+        return _bytes_of(file, min(length, maximum), max(length - maximum, 0))
     except OSError as error:
         raise unreadable(path, error) from error
     finally:
         os.close(file)
 
 
-def has_mark(path: Path, file: int) -> bool:
-    """Tell whether an open file ends with a seal; files of others need not be read whole."""
+def has_trailer(path: Path, file: int) -> bool:
+    """Tell whether an open file ends with a checksum trailer; files of others need not be read whole."""
     try:
         line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
     except OSError as error:
         raise unreadable(path, error) from error
-    return line.startswith(_MARK)
+    return line.startswith(_PREFIX)
 
 
 def check_open(path: Path, file: int) -> bytes:
-    """Compare an open file with its seal."""
+    """Compare an open file with its checksum trailer."""
     try:
-        size = os.fstat(file).st_size - LENGTH
-        line = os.pread(file, LENGTH, max(size, 0))
-        _check(line, _hash(file, size))
+        length = os.fstat(file).st_size - LENGTH
+        line = os.pread(file, LENGTH, max(length, 0))
+        _check(line, _hash(file, length))
     except OSError as error:
         raise unreadable(path, error) from error
     return line
 
 
 def _line(digest: str) -> bytes:
-    return _MARK + digest.encode() + b"\n"
+    return _PREFIX + digest.encode() + b"\n"
 
 
 def _check(line: bytes, digest: str) -> None:
-    if not line.startswith(_MARK):
-        raise DamagedError(UNSEALED)
+    if not line.startswith(_PREFIX):
+        raise DamagedError(NO_TRAILER)
     if line != _line(digest):
         raise DamagedError("its bytes have changed")
 
 
-def _hash(file: int, size: int) -> str:
-    total, place = hashlib.sha256(), 0
-    while place < size:
-        data = os.pread(file, min(_STEP, size - place), place)
+def _hash(file: int, length: int) -> str:
+    total, offset = hashlib.sha256(), 0
+    while offset < length:
+        data = os.pread(file, min(_STEP, length - offset), offset)
         if not data:
             break
         total.update(data)
-        place += len(data)
+        offset += len(data)
     return total.hexdigest()
 
 
-def _bytes_of(file: int, size: int, place: int) -> bytes:
+def _bytes_of(file: int, length: int, offset: int) -> bytes:
     parts = []
-    while size > 0 and (data := os.pread(file, min(_STEP, size), place)):
+    while length > 0 and (data := os.pread(file, min(_STEP, length), offset)):
         parts.append(data)
-        size, place = size - len(data), place + len(data)
+        length, offset = length - len(data), offset + len(data)
     return b"".join(parts)

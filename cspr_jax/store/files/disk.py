@@ -20,9 +20,9 @@ class Disk:
         """Write some of the data, perhaps not all."""
         return os.pwrite(file, data, offset)
 
-    def truncate(self, file: int, size: int) -> None:
+    def truncate(self, file: int, length: int) -> None:
         """Set the size of a file."""
-        os.ftruncate(file, size)
+        os.ftruncate(file, length)
 
     def sync(self, file: int) -> None:
         """Flush a file to the disk."""
@@ -59,7 +59,7 @@ class Disk:
 
 def open_plain(path: Path, how: int) -> int:
     """Open a file for writing that has no other name, or make it."""
-    check_plain(path)  # opening a device can do something to it; looked at again against a change between
+    check_plain(path)  # opening a device can do something to it; checked again against a change between
     file = os.open(path, how | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY, USUAL)
     try:
         _check_plain(os.fstat(file))

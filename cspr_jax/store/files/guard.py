@@ -1,8 +1,8 @@
 """Guarded reading of HDF5 files that anybody may have made: plain numbers and short texts, in one file, of known sizes.
 
-A file can be sealed by anybody. HDF5 follows links into other files (a pipe keeps it waiting for ever), unpacks
+Anybody can write a checksum that fits. HDF5 follows links into other files (a pipe keeps it waiting for ever), unpacks
 any amount of memory from a few bytes, and builds whatever type a file describes. So every object is asked
-for by its name, and its link, layout, filters, type and size are looked at, in this order, before it is read.
+for by its name, and its link, layout, filters, type and size are checked, in this order, before it is read.
 """
 
 import math
@@ -20,7 +20,7 @@ LARGEST_CHUNKS, LARGEST_CHUNK = 100_000, 1 << 24
 # Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16
-MOST_ROWS = 1000  # of an attribute with a row for each cable
+LARGEST_ROWS = 1000  # of an attribute with a row for each cable
 # Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
@@ -50,17 +50,17 @@ class ReadableDataset(NamedTuple):
         data: the open dataset.
         shape: its shape.
         dtype: of NumPy.
-        size: bytes in memory.
+        memory_bytes: size in memory.
         chunks: their number.
-        stored: bytes in the file.
+        file_bytes: size in the file.
     """
 
     data: h5d.DatasetID
     shape: tuple[int, ...]
     dtype: str
-    size: int
+    memory_bytes: int
     chunks: int
-    stored: int
+    file_bytes: int
 
     def values(self) -> np.ndarray:
         """All values of the dataset."""
@@ -71,21 +71,21 @@ class ReadableDataset(NamedTuple):
 
 
 def datasets(file: h5py.File, names: Iterable[str], *, is_joined: bool = False) -> dict[str, ReadableDataset]:
-    """Open the named datasets that a file holds; nothing else of the file is looked at."""
+    """Open the named datasets that a file holds; nothing else of the file is inspected."""
     return {name: _dataset(file, name, is_joined) for name in names if file.id.links.exists(name.encode())}
 
 
-def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
+def refuse_dense(datasets: Iterable[ReadableDataset], file_bytes: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has."""
     readable = list(datasets)
-    total, maximum = sum(one.size for one in readable), _PLENTY + densest * size
+    total, maximum = sum(one.memory_bytes for one in readable), _PLENTY + densest * file_bytes
     if total > maximum:
         raise DamagedError(
             f"it says it holds {total / 1e9:.3g} GB: must be at most {maximum / 1e9:.3g} GB in a file of its size"
         )
-    stored = sum(one.stored + _PER_CHUNK * one.chunks for one in readable)
-    if size > _PLENTY + 1.2 * stored:
-        raise DamagedError(f"{(size - stored) / 1e9:.3g} GB of it are none of its quantities")
+    explained = sum(one.file_bytes + _PER_CHUNK * one.chunks for one in readable)
+    if file_bytes > _PLENTY + 1.2 * explained:
+        raise DamagedError(f"{(file_bytes - explained) / 1e9:.3g} GB of it are none of its quantities")
 
 
 def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
@@ -108,11 +108,11 @@ def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str 
     is_variable = kind.is_variable_str()
     # The length of a text of variable length is known only once it has been read, within the limits of this process.
     data = item.attrs[name].encode("utf-8", "surrogateescape") if is_variable else b""
-    size = len(data) if is_variable else kind.get_size()
-    if size > largest:
-        raise DamagedError(f"its {name} has {size} bytes: must be at most {largest}")
+    length = len(data) if is_variable else kind.get_size()
+    if length > largest:
+        raise DamagedError(f"its {name} has {length} bytes: must be at most {largest}")
     if not is_variable:
-        array = np.empty((), f"S{size}")
+        array = np.empty((), f"S{length}")
         attribute.read(array, mtype=kind)
         data = array.item()
     try:
@@ -130,7 +130,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     extent = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
     extent = () if extent == (1,) and not shape else extent  # netCDF has lists of one number
     fits = len(extent) == len(shape) and space.get_simple_extent_type() != h5s.NULL
-    fits = fits and all(1 <= n <= MOST_ROWS if m is None else n == m for n, m in zip(extent, shape, strict=True))
+    fits = fits and all(1 <= n <= LARGEST_ROWS if m is None else n == m for n, m in zip(extent, shape, strict=True))
     if not fits or _dtype(attribute.get_type()) != dtype:
         raise DamagedError(f"its {name} has another type or shape than cspr writes")
     array = np.empty(extent, dtype)
@@ -145,8 +145,8 @@ def _dataset(file: h5py.File, name: str, is_joined: bool) -> ReadableDataset:
     if h5o.get_info(file.id, key).type != h5o.TYPE_DATASET:
         raise DamagedError(f"{name} is not a dataset")
     data = h5d.open(file.id, key)
-    known = sum(h5a.exists(data, one.encode()) for one in _ATTRIBUTES)
-    if any(h5a.exists(data, one.encode()) for one in _SCALING) or (not is_joined and h5a.get_num_attrs(data) > known):
+    count = sum(h5a.exists(data, one.encode()) for one in _ATTRIBUTES)
+    if any(h5a.exists(data, one.encode()) for one in _SCALING) or (not is_joined and h5a.get_num_attrs(data) > count):
         raise DamagedError(f"{name} has attributes that are none of cspr")
     creation = data.get_create_plist()
     # Asked before the dataspace: HDF5 opens the other files of a virtual dataset to find its shape.
@@ -170,4 +170,4 @@ def _dataset(file: h5py.File, name: str, is_joined: bool) -> ReadableDataset:
 
 def _dtype(kind: h5t.TypeID) -> str | None:
     # Nothing is built of a type before it is known to be one of these.
-    return next((name for name, known in _TYPES.items() if any(kind.equal(one) for one in known)), None)
+    return next((name for name, types in _TYPES.items() if any(kind.equal(one) for one in types)), None)

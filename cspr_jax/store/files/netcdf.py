@@ -13,7 +13,7 @@ import numpy as np
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity, flag_attributes
-from cspr_jax.store.files.checksum import seal_file
+from cspr_jax.store.files.checksum import write_trailer
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import new_file
 from cspr_jax.store.files.stream import DiskFile
@@ -34,7 +34,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """HDF5 file that is written into an open, empty file; it is sealed when HDF5 has closed it."""
+    """HDF5 file that is written into an open, empty file; its checksum trailer follows when HDF5 has closed it."""
     through = DiskFile(disk, descriptor)
     try:
         with h5py.File(through, "w", libver=LAYOUT) as file:
@@ -44,7 +44,7 @@ def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterat
         through.raise_failure()  # HDF5's complaint follows from it
         raise
     through.raise_failure()
-    seal_file(disk, descriptor, through.size)
+    write_trailer(disk, descriptor, through.length)
 
 
 def make_datasets(
@@ -106,7 +106,7 @@ def plain(value: Any) -> Any:
 
 
 def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
-    """Room that a run needs at most, its shards and its result together."""
+    """Space that a run needs at most, its shards and its result together."""
     one = sum(np.dtype(dtype_of(name, dtype)).itemsize for name in store)
     # Twice the data, and a tenth for chunks that do not compress and for what describes them.
     return int(2.1 * np.prod([float(n) for n in shape]) * one) + (1 << 20)

@@ -24,7 +24,7 @@ def part_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
-def check_place(path: Path | None) -> None:
+def check_writable(path: Path | None) -> None:
     """Refuse a file that cannot be written where it is to be, before the work of which it is the end."""
     if path is None:
         return

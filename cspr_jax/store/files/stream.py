@@ -18,13 +18,13 @@ class DiskFile(io.RawIOBase):
 
     def __init__(self, disk: Disk, file: int) -> None:
         """Start at the beginning."""
-        self._disk, self._file, self._at, self._size = disk, file, 0, 0
+        self._disk, self._file, self._at, self._length = disk, file, 0, 0
         self._failure: BaseException | None = None
 
     @property
-    def size(self) -> int:
+    def length(self) -> int:
         """Bytes that the file has."""
-        return self._size
+        return self._length
 
     def raise_failure(self) -> None:
         """Raise what the disk first refused, if it did."""
@@ -33,7 +33,7 @@ class DiskFile(io.RawIOBase):
 
     def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
         """Go to an offset."""
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._length}[whence]
         return self._at
 
     def tell(self) -> int:
@@ -60,18 +60,18 @@ class DiskFile(io.RawIOBase):
             except BaseException as failure:  # noqa: BLE001 - whatever it is, it must not pass through HDF5
                 self._failure = failure
         self._at += len(view)
-        self._size = max(self._size, self._at)
+        self._length = max(self._length, self._at)
         return len(view)
 
-    def truncate(self, size: int | None = None, /) -> int:
+    def truncate(self, length: int | None = None, /) -> int:
         """Set the size, or keep the reason why not."""
-        self._size = self._at if size is None else size
+        self._length = self._at if length is None else length
         if self._failure is None:
             try:
-                self._disk.truncate(self._file, self._size)
+                self._disk.truncate(self._file, self._length)
             except BaseException as failure:  # noqa: BLE001 - as above
                 self._failure = failure
-        return self._size
+        return self._length
 
     def readable(self) -> bool:
         """It can be read."""

@@ -28,7 +28,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import from_outside
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Header
-from cspr_jax.store.files.checksum import UNSEALED, DamagedError, check_open, has_mark, open_regular
+from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError, check_open, has_trailer, open_regular
 from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
 # Hashing so many bytes takes a moment; larger files are inspected before they are hashed.
@@ -58,21 +58,21 @@ _ENDS = {
 class _Opened(NamedTuple):
     path: Path
     file: int
-    seal: bytes | None  # None: not compared yet, since the file is large, or there is none
-    is_sealed: bool
+    trailer: bytes | None  # None: not compared yet, since the file is large, or there is none
+    has_trailer: bool
 
 
 class Reader:
     """A process that reads files, started when the first one is asked for, and anew after one on which it failed.
 
     Fields:
-        known: seals of shards that this process has written itself, or that were read without a fault before: this
-            process reads their bytes itself.
+        trusted: trailers of shards that this process has written, or that were read without an error before: it reads
+            their bytes itself.
     """
 
     def __init__(self) -> None:
         """Nothing is started yet."""
-        self.known: set[bytes] = set()
+        self.trusted: set[bytes] = set()
         self._child: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
         self._pipe: RawIOBase | None = None
@@ -91,8 +91,8 @@ class Reader:
     def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
         """Attributes, axes and quantities of a file, as far as this program writes them."""
         with (
-            self._opened(path, follow=True, is_unsealed_too=True) as opened,
-            self._answered(opened, {"what": "result", "is_sealed": opened.is_sealed}) as (answer, pipe),
+            self._opened(path, follow=True, needs_no_trailer=True) as opened,
+            self._answered(opened, {"what": "result", "has_trailer": opened.has_trailer}) as (answer, pipe),
         ):
             arrays = {}
             for name, dtype, shape in answer["arrays"]:
@@ -108,53 +108,53 @@ class Reader:
     def shard(self, path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
         """A shard, checked in every respect."""
         words = {"what": "shard", "layout": dataclasses.asdict(layout), "index": index, "shape": shape}
-        with self._opened(path, most=LARGEST_SHARD) as opened:
-            if opened.seal in self.known:
+        with self._opened(path, maximum=LARGEST_SHARD) as opened:
+            if opened.trailer in self.trusted:
                 with os.fdopen(os.dup(opened.file), "rb") as data:
                     return decode(io.BytesIO(data.read()), layout, index, shape)
             with self._answered(opened, words) as (answer, pipe):
                 values = {name: _array(pipe, dtype, shape) for name, dtype in answer["arrays"]}
-            if opened.seal is not None:
-                self.known.add(opened.seal)
+            if opened.trailer is not None:
+                self.trusted.add(opened.trailer)
             return Shard(**answer["shard"], values=values)
 
     def header(self, path: Path) -> Header:
         """Header of a shard, of whatever run."""
         with (
-            self._opened(path, most=LARGEST_SHARD) as opened,
+            self._opened(path, maximum=LARGEST_SHARD) as opened,
             self._answered(opened, {"what": "header"}) as (answer, _),
         ):
             return Header(**answer["header"])
 
     @contextlib.contextmanager
     def _opened(
-        self, path: Path, *, follow: bool = False, most: int | None = None, is_unsealed_too: bool = False
+        self, path: Path, *, follow: bool = False, maximum: int | None = None, needs_no_trailer: bool = False
     ) -> Iterator["_Opened"]:
         file = open_regular(path, follow=follow)
         try:
-            size = os.fstat(file).st_size
-            if most is not None and size > most:
+            length = os.fstat(file).st_size
+            if maximum is not None and length > maximum:
                 raise DamagedError("it is not a file of a fitting size")
-            is_sealed = has_mark(path, file)
-            if not (is_sealed or is_unsealed_too):
-                raise DamagedError(UNSEALED)
-            yield _Opened(path, file, check_open(path, file) if is_sealed and size <= _QUICK else None, is_sealed)
+            is_marked = has_trailer(path, file)
+            if not (is_marked or needs_no_trailer):
+                raise DamagedError(NO_TRAILER)
+            yield _Opened(path, file, check_open(path, file) if is_marked and length <= _QUICK else None, is_marked)
         finally:
             os.close(file)
 
     @contextlib.contextmanager
     def _answered(self, opened: "_Opened", words: dict[str, Any]) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
-        path, file, seal, is_sealed = opened
+        path, file, trailer, is_marked = opened
         try:
             pipe = self._sent(path, file, words)
             answer = self._header(pipe, patience=_PATIENCE)
-            if seal is None and is_sealed:
+            if trailer is None and is_marked:
                 check_open(path, file)
             yield answer, pipe
         except EOFError as error:
             raise self._ended(path) from error
         except DamagedError:
-            if seal is not None:
+            if trailer is not None:
                 check_open(path, file)  # a disk that fails now is no fault of the file
             raise
         self._idle = True
@@ -179,8 +179,8 @@ class Reader:
         settings = {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::", "HDF5_USE_FILE_LOCKING": "FALSE"}
         with contextlib.suppress(ConfigError):  # told where its map is asked for
             MAP_KINDS.complete()
-        rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
-        command = [sys.executable, "-I", "-c", _CODE, "\n".join(_places()), home, rows]
+        quantities = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
+        command = [sys.executable, "-I", "-c", _CODE, "\n".join(_library_folders()), home, quantities]
         current, there = socket.socketpair()
         with there:
             try:
@@ -224,9 +224,9 @@ class Reader:
     def _header(self, pipe: RawIOBase, *, patience: float | None) -> dict[str, Any]:
         if patience is not None and not select.select([pipe], [], [], patience)[0]:
             raise DamagedError("HDF5 waits for something")
-        size = bytearray(8)
-        _fill(pipe, memoryview(size))
-        data = bytearray(int.from_bytes(size, "little"))
+        length = bytearray(8)
+        _fill(pipe, memoryview(length))
+        data = bytearray(int.from_bytes(length, "little"))
         _fill(pipe, memoryview(data))
         header = json.loads(data)
         self._idle = "refused" in header or "failed" in header
@@ -237,7 +237,7 @@ class Reader:
         return header
 
 
-def _places() -> list[str]:
+def _library_folders() -> list[str]:
     specs = [spec for name in _LIBRARIES if (spec := importlib.util.find_spec(name)) is not None]
     depths = [(spec.origin, 1 if spec.submodule_search_locations else 0) for spec in specs]
     return sorted({str(Path(origin).parents[depth]) for origin, depth in depths if origin is not None})
@@ -250,11 +250,11 @@ def _array(pipe: RawIOBase, dtype: str, shape: list[int] | tuple[int, ...]) -> n
     return array
 
 
-def _fill(pipe: RawIOBase, place: memoryview) -> None:
+def _fill(pipe: RawIOBase, buffer: memoryview) -> None:
     done = 0
-    while done < len(place):
+    while done < len(buffer):
         try:
-            count = pipe.readinto(place[done:])
+            count = pipe.readinto(buffer[done:])
         except ConnectionError as error:
             raise EOFError from error
         if not count:

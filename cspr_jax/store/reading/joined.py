@@ -24,15 +24,15 @@ def joined_map(
         if sorted(names) != (sorted(order) if name in QUANTITIES else [name]):
             raise DamagedError(f"{name} has the dimensions {', '.join(names) or 'none'}: must be {', '.join(order)}")
     axes = {name: arrays[name] for name in order if name in arrays}
-    places = {name: np.argsort(points, kind="stable") for name, points in axes.items()}
+    indices = {name: np.argsort(points, kind="stable") for name, points in axes.items()}
     for name, points in axes.items():
-        repeated = points[places[name]][1:][np.diff(points[places[name]]) == 0.0]
+        repeated = points[indices[name]][1:][np.diff(points[indices[name]]) == 0.0]
         if repeated.size:
             raise DamagedError(f"{name} = {repeated[0]:.9g} is there twice: must be once, as xarray's merge leaves it")
-    result = {name: points[places[name]] for name, points in axes.items()}
+    result = {name: points[indices[name]] for name, points in axes.items()}
     for name in arrays.keys() & QUANTITIES.keys():
         values = arrays[name].transpose([dimensions[name].index(axis) for axis in order])
-        result[name] = _typed(name, values[np.ix_(*places.values())])
+        result[name] = _typed(name, values[np.ix_(*indices.values())])
     settings = settings | {"axes": settings["axes"] | {name: result[name].tolist() for name in settings["axes"]}}
     return {name: value for name, value in attributes.items() if name not in _OF_ONE}, settings, result
 

@@ -25,13 +25,13 @@ def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | Moti
     return _samples(path) if ending in HDF5 else text.read(path)
 
 
-def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
+def motion_windows(path: Path, n_rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
     """A table of samples, window by window, so that its length is not limited; see `config.motions.text.windows`."""
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
         raise ConfigError(path, "must be a table of samples here")
     if ending not in HDF5:
-        yield from text.windows(path, rows)
+        yield from text.windows(path, n_rows)
         return
     table = _samples(path)
     yield text.MotionWindow(table, 0, len(table.times) - 1, is_last=True)

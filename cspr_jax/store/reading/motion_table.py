@@ -18,7 +18,7 @@ from cspr_jax.store.files.netcdf import file_size
 # Both are sizes of text; numbers take a third of it in memory. The header has some hundred names.
 LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
 FEASIBLE = "feasible"
-# Rows whose work is looked at; part of the work that lifting must explain for its sign to say where z points.
+# Rows whose work is examined; part of the work that lifting must explain for its sign to say where z points.
 WORK_ROWS, EXPLAINED = 4096, 0.5
 
 
@@ -29,7 +29,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     try:
         with path.open(encoding="utf-8-sig", newline=None) as file:
             heads = file.readline(LARGEST_HEADER).rstrip("\n").split(",")
-            places = _places(heads)
+            columns = _column_indices(heads)
             comments: list[str] = []
             table = np.loadtxt(_rows(file, comments), delimiter=",", comments=None, ndmin=2)
     except OSError as error:
@@ -44,7 +44,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         if not np.isin(flags, (0.0, 1.0)).all():
             raise DamagedError(f"{FEASIBLE} holds another number than 0 and 1")
         attributes[FEASIBLE] = int(flags.all())
-    arrays = {name: _typed(name, np.ascontiguousarray(table[:, place])) for name, place in places.items()}
+    arrays = {name: _typed(name, np.ascontiguousarray(table[:, column])) for name, column in columns.items()}
     if "mass_centre" in arrays:
         attributes["point"] = "origin"
     z_axis = _axis_in(comments) or _vertical(arrays)
@@ -67,7 +67,7 @@ def _vertical(arrays: dict[str, np.ndarray]) -> str | None:
     power, terms = -(tension * rate).sum(axis=1), [velocity[:, 2], (velocity * acceleration).sum(axis=1)]
     if "omega" in arrays and "omega_dot" in arrays:
         terms.append((arrays["omega"][::step] * arrays["omega_dot"][::step]).sum(axis=1))
-    terms = [term / size for term in terms if (size := float(np.linalg.norm(term))) > 0.0]
+    terms = [term / norm for term in terms if (norm := float(np.linalg.norm(term))) > 0.0]
     if not velocity[:, 2].any() or not power.any():
         return None
 
@@ -108,10 +108,10 @@ def _rows(file, comments: list[str]):
         raise DamagedError("it has no rows")
 
 
-def _places(heads: list[str]) -> dict[str, Any]:
+def _column_indices(heads: list[str]) -> dict[str, Any]:
     # Column, or columns, of each quantity; they stand in the order in which `cspr plan` writes them.
     names = heads[:-1] if heads[-1] == FEASIBLE else heads
-    places: dict[str, Any] = {}
+    indices: dict[str, Any] = {}
     start = 0
     for name in TRAJECTORY:
         parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MOST_CABLES))) if name in ACROSS else ()
@@ -122,9 +122,9 @@ def _places(heads: list[str]) -> dict[str, Any]:
             continue
         if ACROSS.get(name) != "cable" and count != len(columns):
             raise DamagedError(f"it has no column {columns[count]} behind {columns[count - 1]}")
-        places[name] = slice(start, start + count) if parts else start
+        indices[name] = slice(start, start + count) if parts else start
         start += count
     if start < len(names):
-        hint = "; a motion of your own needs its robot, --robot" if "position" not in places else ""
+        hint = "; a motion of your own needs its robot, --robot" if "position" not in indices else ""
         raise DamagedError(f"column {shown(names[start])}: must be one that `cspr plan` writes, in its order{hint}")
-    return places
+    return indices

@@ -30,17 +30,17 @@ from cspr_jax.schema.quantities import (
 )
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.files import guard
-from cspr_jax.store.files.checksum import UNSEALED, DamagedError
+from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError
 from cspr_jax.store.files.netcdf import UNREADABLE, reason
 from cspr_jax.store.shards import Layout, decode, header_of
 
 # A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
 LARGEST_DATA, DENSEST = 8e9, 50
 # Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
-_LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
+_INSPECTION_SECONDS, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
-_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
+_PART_NAMES = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
 # Attribute that libraries of netCDF add to the files that they write.
 _OF_NETCDF = b"_NCProperties"
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
@@ -58,15 +58,15 @@ def serve() -> None:
     arguments of the command are two folders of `store.reading.isolated`, and the quantities that the asking process has
     registered.
     """
-    for row in json.loads(sys.argv[3]):
-        register(Quantity(**row))
+    for quantity in json.loads(sys.argv[3]):
+        register(Quantity(**quantity))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     channel = socket.socket(fileno=0)
     out = channel.makefile("wb")
     _tell(out, {})  # ready
     while (request := _next(channel)) is not None:
         words, file = request
-        _grant(_LOOK, 0)
+        _grant(_INSPECTION_SECONDS, 0)
         answer(Path(f"/dev/fd/{file}"), words, out)
         os.close(file)
 
@@ -88,8 +88,8 @@ def _next(channel: socket.socket) -> tuple[dict[str, Any], int] | None:
     data, files, _, _ = socket.recv_fds(channel, 8, 1)
     if not data:
         return None
-    size = int.from_bytes(data + _exactly(channel, 8 - len(data)), "little")
-    return json.loads(_exactly(channel, size)), files[0]
+    length = int.from_bytes(data + _exactly(channel, 8 - len(data)), "little")
+    return json.loads(_exactly(channel, length)), files[0]
 
 
 def _exactly(channel: socket.socket, count: int) -> bytes:
@@ -103,11 +103,11 @@ def _exactly(channel: socket.socket, count: int) -> bytes:
 
 
 def _check_netcdf(path: Path) -> None:
-    # Another program's files have no seal; one of this program that is not whole has none either.
+    # Another program's files have no trailer; one of this program that is not whole has none either.
     with contextlib.suppress(*UNREADABLE), h5py.File(path, "r") as file:
         if h5a.exists(file.id, _OF_NETCDF):
             return
-    raise DamagedError(UNSEALED)
+    raise DamagedError(NO_TRAILER)
 
 
 def _dimensions(data: h5py.Dataset) -> list[str]:
@@ -118,20 +118,20 @@ def _dimensions(data: h5py.Dataset) -> list[str]:
 
 
 def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
-    if not words["is_sealed"]:
+    if not words["has_trailer"]:
         _check_netcdf(path)
     with h5py.File(path, "r") as file:
         attributes = _attributes(file)
         tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
-        is_joined = not words["is_sealed"]
+        is_joined = not words["has_trailer"]
         if is_joined and not {"map", "settings"} <= attributes.keys():
             raise DamagedError("a joined map must keep the attributes of one of them: combine_attrs='override'")
         datasets = guard.datasets(file, [name for table in tables for name in table], is_joined=is_joined)
-        marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
+        names_of_parts = [name for name in _PART_NAMES if "map" not in attributes and file.id.links.exists(name)]
         if not is_joined:
-            guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
+            guard.refuse_others(file, len(datasets) + len(names_of_parts), len(attributes))
         guard.refuse_dense(datasets.values(), path.stat().st_size, densest=DENSEST)
-        total = sum(one.size for one in datasets.values())
+        total = sum(one.memory_bytes for one in datasets.values())
         if total > LARGEST_DATA:
             raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
         arrays = [[name, one.dtype, one.shape] for name, one in datasets.items()]
@@ -202,8 +202,8 @@ def _send(out: BinaryIO, values: np.ndarray) -> None:
 
 def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
     readable = list(datasets)
-    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in readable)
-    _grant(_LOOK + seconds, 2 * max((one.size for one in readable), default=0))
+    seconds = sum(one.memory_bytes * _PER_BYTE + one.chunks * _PER_CHUNK for one in readable)
+    _grant(_INSPECTION_SECONDS + seconds, 2 * max((one.memory_bytes for one in readable), default=0))
 
 
 def _grant(seconds: float, memory: int) -> None:
@@ -222,8 +222,8 @@ class _Limits:
     are_foreign = False
 
 
-def _limit(what: int, most: int) -> None:
+def _limit(what: int, maximum: int) -> None:
     hard = resource.getrlimit(what)[1]
-    if hard != resource.RLIM_INFINITY and hard < most:
-        most, _Limits.are_foreign = hard, True
-    resource.setrlimit(what, (most, hard))
+    if hard != resource.RLIM_INFINITY and hard < maximum:
+        maximum, _Limits.are_foreign = hard, True
+    resource.setrlimit(what, (maximum, hard))

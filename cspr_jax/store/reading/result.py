@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # No number of a result is larger, but those that are infinite.
 LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
 # Settings have some ten tables and lists, and some fifty keys.
-_MOST_PARTS = 10_000
+_LARGEST_PARTS = 10_000
 _BLOCK = 1 << 20
 
 
@@ -36,11 +36,11 @@ class BestPoints(NamedTuple):
 
     Fields:
         points: (n,) of the axis.
-        places: (...) of the best point in the axis, of the shape of the quantities.
+        indices: (...) of the best point in the axis, of the shape of the quantities.
     """
 
     points: np.ndarray
-    places: np.ndarray
+    indices: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,23 +81,24 @@ class Result:
 
     def _without(self, axis: str) -> "Result":
         check_axis(axis, tuple(self.axes))
-        place, points = list(self.axes).index(axis), self.axes[axis]
-        data, places = best_of(self.data, axis, points, place, MAP_KINDS[self.attributes["map"]].pictured)
+        dimension, points = list(self.axes).index(axis), self.axes[axis]
+        data, indices = best_of(self.data, axis, points, dimension, MAP_KINDS[self.attributes["map"]].pictured)
         others = {name: points for name, points in self.axes.items() if name != axis}
         earlier = {
             name: BestPoints(
-                choice.points, np.take_along_axis(choice.places, np.expand_dims(places, place), place).squeeze(place)
+                choice.points,
+                np.take_along_axis(choice.indices, np.expand_dims(indices, dimension), dimension).squeeze(dimension),
             )
             for name, choice in self.choices.items()
         }
-        choices = earlier | {axis: BestPoints(points, places)}
+        choices = earlier | {axis: BestPoints(points, indices)}
         units, labels = _described(self.settings.get("map"), [*others, *choices, *data])
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 
-    def place(self, index: tuple[int, ...]) -> dict[str, float]:
+    def coordinates(self, index: tuple[int, ...]) -> dict[str, float]:
         """Coordinates of a cell of a map."""
-        place = {axis: float(points[i]) for (axis, points), i in zip(self.axes.items(), index, strict=True)}
-        return place | {axis: float(choice.points[choice.places[index]]) for axis, choice in self.choices.items()}
+        point = {axis: float(points[i]) for (axis, points), i in zip(self.axes.items(), index, strict=True)}
+        return point | {axis: float(choice.points[choice.indices[index]]) for axis, choice in self.choices.items()}
 
     def to_xarray(self) -> "xarray.Dataset":
         """The result for xarray: named dimensions, units and long names, and the attributes of the file."""
@@ -153,8 +154,10 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[st
 
 def _described(kind: object, names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
     # Units and long names, as the kind of map says them.
-    rows = {name: quantity_of(kind, name) for name in names}
-    return {name: row.units for name, row in rows.items()}, {name: row.long_name for name, row in rows.items()}
+    quantities = {name: quantity_of(kind, name) for name in names}
+    return {name: quantity.units for name, quantity in quantities.items()}, {
+        name: quantity.long_name for name, quantity in quantities.items()
+    }
 
 
 def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
@@ -162,7 +165,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     if text is None:
         raise DamagedError(f"it has no {name}")
     # This is checked before anything is built from the text.
-    if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
+    if max(text.count("[") + text.count("{"), text.count(":")) > _LARGEST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:
         table = plain_json(text)
@@ -239,8 +242,8 @@ def _motion(
     if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MOST_CABLES:
         raise DamagedError("it is not a motion of two cables or more")
     # Motions of straight lines know no P0.
-    known = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
-    for name, maximum in known.items():
+    bounds = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
+    for name, maximum in bounds.items():
         if not 1.0 / maximum <= attributes.get(name, 0.0) <= maximum:
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
     widths = {
@@ -277,14 +280,14 @@ def _as_now(name: str, array: np.ndarray) -> np.ndarray:
     return array if kind == "float" else array.astype(kind, copy=False)
 
 
-def _check_numbers(name: str, array: np.ndarray, most: float, *, finite: bool = True) -> None:
+def _check_numbers(name: str, array: np.ndarray, maximum: float, *, finite: bool = True) -> None:
     flat = array.reshape(-1)
     for start in range(0, flat.size, _BLOCK):
         block = flat[start : start + _BLOCK]
         if block.dtype.kind == "f":
-            known = np.isfinite(block)
-            if finite and not known.all():
+            is_finite = np.isfinite(block)
+            if finite and not is_finite.all():
                 raise DamagedError(f"{name} holds numbers that are not finite")
-            block = np.abs(block[known])
-        if block.size and (block.max() > most or block.min() < 0):
+            block = np.abs(block[is_finite])
+        if block.size and (block.max() > maximum or block.min() < 0):
             raise DamagedError(f"{name} holds numbers that no result has")

@@ -129,7 +129,7 @@ def _joined(parts: list[Part]) -> Part:
     return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _speeds_kernel(velocity: AffineBounds) -> Part:
     return jax.vmap(lambda each: _joined([_part(-norm(each.each(lambda x: x[None])))]))(velocity)
 

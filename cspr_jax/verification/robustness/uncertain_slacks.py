@@ -67,7 +67,7 @@ def radii_of(limits: Limits, multiple: Float[np.ndarray, "k"]) -> Radii:
     return Radii(spools, centre, factor)
 
 
-@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.proof_options())
 def blocks_hold(
     robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Radii], *, contacts_alone: bool = False
 ) -> Float[Array, "k"]:
@@ -89,7 +89,7 @@ def blocks_hold(
     return jax.vmap(one)(*cases)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Radii]) -> Float[Array, "k n_slacks"]:
     """Lower bounds of the slacks of tensions and limits of all robots over blocks."""
 
@@ -147,7 +147,7 @@ def _largest(
     return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.magnitude() + more}
 
 
-@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.proof_options())
 def _upper_slacks(
     robot: AnyRobot,
     limits: Limits,

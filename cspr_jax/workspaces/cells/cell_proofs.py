@@ -16,10 +16,10 @@ from cspr_jax.robots.model.platform import PlatformRobot, across_line
 from cspr_jax.robots.statics.wrench_sets import spanning
 from cspr_jax.robots.tensions.tension_rules import distributions
 from cspr_jax.workspaces.cells.cells import cells_about
-from cspr_jax.workspaces.cells.inside_cells import least_margins
+from cspr_jax.workspaces.cells.inside_cells import lower_margins
 from cspr_jax.workspaces.cells.outside_cells import are_beyond, are_one_sided
 from cspr_jax.workspaces.cells.shifts import leaving_points, shifts
-from cspr_jax.workspaces.cells.worst_facet_normals import worst_cocircuits
+from cspr_jax.workspaces.cells.worst_facet_normals import worst_facets
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 
@@ -70,9 +70,9 @@ class CellProofs:
         """Tell whether cells lie wholly inside."""
         if not (self._spools or half.any()):
             return self._search(positions, np.tile(self._quaternion, (len(positions), 1))).verdict == 0
-        return self.least_margins(positions, half) > 0.0
+        return self.lower_margins(positions, half) > 0.0
 
-    def least_margins(
+    def lower_margins(
         self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]
     ) -> Float[np.ndarray, "n"]:
         """Lower bounds of margins over cells."""
@@ -82,16 +82,16 @@ class CellProofs:
         margin = self._boxed(positions, np.tile(self._quaternion, (len(positions), 1))).margin
         if self._is_closure:  # tensions without a wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
-            room = np.ones((1, 1))
+            slack = np.ones((1, 1))
         else:
-            size = (np.abs(loads).max() + np.abs(low).max()) or 1.0
-            room = KEPT * np.where(np.isfinite(margin), np.maximum(margin, 0.0), size)[:, None]
-        tensions = [_tensions(units, load, low + room, high - room) for load in loads]
+            scale = (np.abs(loads).max() + np.abs(low).max()) or 1.0
+            slack = KEPT * np.where(np.isfinite(margin), np.maximum(margin, 0.0), scale)[:, None]
+        tensions = [_tensions(units, load, low + slack, high - slack) for load in loads]
 
         def part(chosen):
             cells = cells_about(positions[chosen], half[chosen], exits[chosen], self._forces, moves[chosen])
             each = zip(tensions, loads, strict=True)
-            return np.min([least_margins(cells, x[chosen], load, low, high) for x, load in each], axis=0)
+            return np.min([lower_margins(cells, x[chosen], load, low, high) for x, load in each], axis=0)
 
         return np.concatenate(in_parts(part, len(positions), PART))
 
@@ -103,7 +103,7 @@ class CellProofs:
 
         def kernel(matrices):
             loads, unbounded = (self._wrenches, self._spreads), self._unbounded
-            return worst_cocircuits(matrices, *loads, low, finite, condition=condition, unbounded=unbounded)
+            return worst_facets(matrices, *loads, low, finite, condition=condition, unbounded=unbounded)
 
         exits, moves = self._exits(positions), self._moves(positions, half)
         for left in range(ROUNDS if self._spools else 0, -1, -1):

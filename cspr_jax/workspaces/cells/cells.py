@@ -25,8 +25,8 @@ import numpy as np
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
-# Rounding may have added this share of the sizes to a sum of up to some hundred products of float64 (2.2e-16 each),
-# with room for rays, arms and rotations that are rounded themselves.
+# Rounding may have added this fraction of the terms to a sum of up to some hundred products of float64 (2.2e-16 each),
+# with a reserve for rays, arms and rotations that are rounded themselves.
 CELL_ERROR = 1e-12
 
 
@@ -89,19 +89,19 @@ def cells_about(
     return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves, each)
 
 
-def reach(linear: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
+def largest_linear(linear: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
     """Largest value of a linear function over the cells."""
     return np.abs(linear).sum(-1)
 
 
-def least_quadratic(quadratic: Any) -> Any:
+def smallest_quadratic(quadratic: Any) -> Any:
     """Lower bound of a quadratic form over the cells, each product of two components on its own."""
     squares = quadratic.diagonal(axis1=-2, axis2=-1).clip(max=0.0).sum(-1)
     both = quadratic + quadratic.swapaxes(-1, -2)
     return squares - abs(both[..., (0, 0, 1), (1, 2, 2)]).sum(-1)
 
 
-def norm_reach(vectors: Float[np.ndarray, "n 3 ..."]) -> Float[np.ndarray, "n"]:
+def norm_bound(vectors: Float[np.ndarray, "n 3 ..."]) -> Float[np.ndarray, "n"]:
     """Bound of the norm of a linear function over the cells: Euclidean of vectors, Frobenius' of matrices."""
     rows = vectors.reshape(*vectors.shape[:2], math.prod(vectors.shape[2:]))
     return np.sqrt(np.abs(rows @ rows.transpose(0, 2, 1)).sum((1, 2)))
@@ -116,16 +116,16 @@ def pair_norm(vectors: Float[np.ndarray, "n 3 3 m"]) -> Float[np.ndarray, "n"]:
 
 def inverse_factor(squares: Float[np.ndarray, "n m m"]) -> Float[np.ndarray, "n m m"]:
     """Inverse of the lower Cholesky factor of symmetric matrices; no error where one is not positive definite."""
-    size = squares.shape[1]
+    n = squares.shape[1]
     left = np.ascontiguousarray(squares.transpose(1, 2, 0))
     inverse = np.zeros_like(left)
     with np.errstate(all="ignore"):
-        for k in range(size):
+        for k in range(n):
             scale = 1.0 / np.sqrt(left[k, k])
             column = left[k:, k] * scale
             inverse[k, k] = 1.0
             inverse[k, : k + 1] *= scale
-            for i in range(k + 1, size):
+            for i in range(k + 1, n):
                 left[i, k + 1 : i + 1] -= column[i - k] * column[1 : i - k + 1]
                 inverse[i, : k + 1] -= column[i - k] * inverse[k, : k + 1]
     return inverse.transpose(2, 0, 1)

@@ -36,7 +36,7 @@ from cspr_jax.robots.contacts.convex_gaps import (
     parting_direction,
 )
 from cspr_jax.runtime import compile_options
-from cspr_jax.workspaces.cells.cells import least_quadratic
+from cspr_jax.workspaces.cells.cells import smallest_quadratic
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -105,7 +105,7 @@ def _rotated(shape: Shape, rotation: np.ndarray) -> Shape:
     return shape._replace(corners=shape.corners @ rotation.T, planes=planes)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@partial(jax.jit, compiler_options=compile_options.proof_options())
 def _kernel(bodies: Bodies, cells: _CellLanes) -> Range:
     return jax.vmap(partial(_of_cell, bodies))(cells)
 
@@ -162,7 +162,7 @@ def _gap(first: Solid, second: Solid) -> Range:
     low = (
         between.middle @ normal
         - jnp.sum(jnp.abs(linear), axis=-1)
-        + least_quadratic(quadratic)
+        + smallest_quadratic(quadratic)
         - longest * between.radius
     )
     low = jnp.min(low)

@@ -28,17 +28,17 @@ from cspr_jax.workspaces.cells.cells import (
     CELL_ERROR,
     Cells,
     inverse_factor,
-    least_quadratic,
-    norm_reach,
+    largest_linear,
+    norm_bound,
     pair_norm,
-    reach,
+    smallest_quadratic,
 )
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
 
-class _Way(NamedTuple):
+class _DensityChange(NamedTuple):
     # Relative change of the force densities over a cell: terms of first and second order in x, of first order in what
     # exits are off, and a bound of the rest.
     linear: np.ndarray  # (n, n_cables, 3)
@@ -49,10 +49,10 @@ class _Way(NamedTuple):
     @property
     def second(self) -> np.ndarray:
         """Bound of the absolute value of the term of second order, (n, n_cables)."""
-        return -np.minimum(least_quadratic(self.quadratic), least_quadratic(-self.quadratic))
+        return -np.minimum(smallest_quadratic(self.quadratic), smallest_quadratic(-self.quadratic))
 
 
-def least_margins(
+def lower_margins(
     cells: Cells,
     tensions: Float[np.ndarray, "n n_cables"],
     wrench: Float[np.ndarray, "m"],
@@ -78,14 +78,14 @@ def tension_bounds(
     with np.errstate(all="ignore"):
         densities = tensions / cells.lengths
         weights = np.minimum(tensions - low, high - tensions) / cells.lengths
-        way = _way(cells, densities, weights, wrench)
-        minimum, maximum = _tension_range(cells, densities, weights, way)
+        change = _density_change(cells, densities, weights, wrench)
+        minimum, maximum = _tension_range(cells, densities, weights, change)
         lost = CELL_ERROR * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
-        is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(way.rest)).all(1, keepdims=True)
+        is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(change.rest)).all(1, keepdims=True)
         return np.where(is_known, minimum - lost, -np.inf), np.where(is_known, maximum + lost, np.inf)
 
 
-def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.ndarray) -> _Way:
+def _density_change(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.ndarray) -> _DensityChange:
     weighted = cells.matrices * weights[:, None]
     inverse = inverse_factor(weighted @ weighted.transpose(0, 2, 1))
     rows = inverse @ weighted  # U
@@ -95,11 +95,11 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
     second = (operators[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
     # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero because of rounding.
-    size = np.linalg.norm(inverse, axis=(1, 2))
-    parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
-    lost = size * np.linalg.norm(rows, axis=(1, 2)) * (CELL_ERROR * parts + _length(cells.rounding * weights))
+    inverse_norm = np.linalg.norm(inverse, axis=(1, 2))
+    parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_bound(cells.changes * weights[:, None, None])
+    lost = inverse_norm * np.linalg.norm(rows, axis=(1, 2)) * (CELL_ERROR * parts + _length(cells.rounding * weights))
     defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2))
-    off, exits = np.zeros(len(size)), np.zeros((*densities.shape, densities.shape[1], 3))
+    off, exits = np.zeros(len(inverse_norm)), np.zeros((*densities.shape, densities.shape[1], 3))
     if cells.moves.any():
         moved = -inverse[:, None] @ cells.wrenches  # (n, 3, m, n_exits)
         maximum = np.linalg.norm(moved, axis=(1, 2)) * cells.moves
@@ -110,14 +110,14 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     supplied = (cells.matrices @ densities[..., None])[..., 0]
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
     hidden = CELL_ERROR * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
-    residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + size * hidden
-    norm, start = norm_reach(operators) + defect, norm_reach(first)
+    residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + inverse_norm * hidden
+    norm, start = norm_bound(operators) + defect, norm_bound(first)
     after = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf)
-    late = np.minimum(pair_norm(second), norm_reach(operators) * start) + defect * start
+    late = np.minimum(pair_norm(second), norm_bound(operators) * start) + defect * start
     rest = defect * start + norm * after * (late + off) + after * residual
     columns = _length(back)
     linear, quadratic = (first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None])
-    return _Way(linear, quadratic, exits, columns * rest[:, None])
+    return _DensityChange(linear, quadratic, exits, columns * rest[:, None])
 
 
 def _over_exits(cells: Cells, effects: np.ndarray) -> np.ndarray:
@@ -134,25 +134,25 @@ def _by_cable(values: np.ndarray) -> np.ndarray:
 
 
 def _tension_range(
-    cells: Cells, densities: np.ndarray, weights: np.ndarray, way: _Way
+    cells: Cells, densities: np.ndarray, weights: np.ndarray, change: _DensityChange
 ) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest tensions over cells, (n, n_cables) each."""
-    lengths, shortening = cells.lengths, reach(cells.steps)
-    second = way.second
-    moved = _over_exits(cells, way.exits)
-    spread = weights * (reach(way.linear) + second + moved + way.rest)
+    lengths, shortening = cells.lengths, largest_linear(cells.steps)
+    second = change.second
+    moved = _over_exits(cells, change.exits)
+    spread = weights * (largest_linear(change.linear) + second + moved + change.rest)
     lowest, highest = densities - spread, densities + spread
     # Expand (L0 - u . dp) f, in which terms of first order may cancel each other.
     relative = weights * lengths
-    linear = relative[..., None] * way.linear - densities[..., None] * cells.steps
-    mixed = cells.steps[..., :, None] * way.linear[..., None, :]
-    quadratic = relative[..., None, None] * way.quadratic - weights[..., None, None] * mixed
-    rest = weights * (shortening * (second + moved) + (lengths + shortening) * way.rest)
+    linear = relative[..., None] * change.linear - densities[..., None] * cells.steps
+    mixed = cells.steps[..., :, None] * change.linear[..., None, :]
+    quadratic = relative[..., None, None] * change.quadratic - weights[..., None, None] * mixed
+    rest = weights * (shortening * (second + moved) + (lengths + shortening) * change.rest)
     middle = lengths * densities
     lengthened = np.eye(lengths.shape[1])[None, ..., None] * (cells.rays * (densities / lengths)[..., None])[:, :, None]
-    rest = rest + _over_exits(cells, relative[..., None, None] * way.exits + lengthened) + cells.moves * spread
-    minimum = middle - reach(linear) + least_quadratic(quadratic) - rest
-    maximum = middle + reach(linear) - least_quadratic(-quadratic) + rest
+    rest = rest + _over_exits(cells, relative[..., None, None] * change.exits + lengthened) + cells.moves * spread
+    minimum = middle - largest_linear(linear) + smallest_quadratic(quadratic) - rest
+    maximum = middle + largest_linear(linear) - smallest_quadratic(-quadratic) + rest
     radius = cells.radius[:, None]
     longest = lengths + radius + cells.moves
     minimum = np.where(lowest >= 0.0, np.maximum(minimum, cells.shortest * lowest), longest * lowest)

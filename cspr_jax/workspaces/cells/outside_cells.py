@@ -26,7 +26,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.workspaces.cells.cells import CELL_ERROR, Cells, inverse_factor, least_quadratic, norm_reach, reach
+from cspr_jax.workspaces.cells.cells import (
+    CELL_ERROR,
+    Cells,
+    inverse_factor,
+    largest_linear,
+    norm_bound,
+    smallest_quadratic,
+)
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Int
@@ -50,10 +57,10 @@ class Products(NamedTuple):
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest values over the cells, (n, n_cables + 1) each."""
-        spread = reach(self.linear) + self.rest
+        spread = largest_linear(self.linear) + self.rest
         return (
-            self.value - spread + least_quadratic(self.quadratic),
-            self.value + spread - least_quadratic(-self.quadratic),
+            self.value - spread + smallest_quadratic(self.quadratic),
+            self.value + spread - smallest_quadratic(-self.quadratic),
         )
 
 
@@ -75,11 +82,11 @@ def are_beyond(
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
         wrong = np.maximum(np.where(is_positive, -minimum, maximum), 0.0)
         is_kept = (~others | is_bounded | (maximum <= 0.0)).all(1)
-        room = np.where(is_bounded, high - low, 0.0)
-        cost = np.where(others, room * wrong * cells.lengths / cells.shortest, 0.0).sum(1)
-        slack = least_slacks(cells, products, limits) - cost
-        size = (np.abs(limits) * np.abs(products.value[:, :-1])).sum(1) + np.abs(products.value[:, -1])
-        return is_kept & (cells.shortest > 0.0).all(1) & (slack > CELL_ERROR * size)
+        width = np.where(is_bounded, high - low, 0.0)
+        cost = np.where(others, width * wrong * cells.lengths / cells.shortest, 0.0).sum(1)
+        slack = lower_slacks(cells, products, limits) - cost
+        scale = (np.abs(limits) * np.abs(products.value[:, :-1])).sum(1) + np.abs(products.value[:, -1])
+        return is_kept & (cells.shortest > 0.0).all(1) & (slack > CELL_ERROR * scale)
 
 
 def are_one_sided(
@@ -117,18 +124,18 @@ def products_of(
     )
     rounding = rounding + CELL_ERROR * np.maximum(np.linalg.norm(units, axis=1), 1.0)
     if held is None:
-        return _still(normals, units, changes, rounding)
-    return _moving(normals, held, units, changes, rounding)
+        return _with_fixed_normal(normals, units, changes, rounding)
+    return _with_moving_normal(normals, held, units, changes, rounding)
 
 
-def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
+def _with_fixed_normal(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
     # Return the products of a normal c that does not move, which are affine.
     value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
     nothing = np.zeros((*value.shape, 3, 3))
     return Products(value, linear.transpose(0, 2, 1), nothing, rounding + CELL_ERROR * np.abs(linear).sum(1))
 
 
-def _moving(
+def _with_moving_normal(
     normals: np.ndarray, held: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray
 ) -> Products:
     # Return the products of a normal c that moves so that it stays normal to the cables S.
@@ -137,15 +144,18 @@ def _moving(
     rows = (frame @ inverse).transpose(0, 2, 1)  # Q^T
     moved = np.take_along_axis(changes, held[:, None, None], axis=3) @ inverse[:, None, :-1]
     operators = rows[:, None] @ moved  # K_k
-    size, count = np.linalg.norm(inverse, axis=(1, 2)), frame.shape[2]
-    lost = np.linalg.norm(rounding[:, :-1], axis=1) + CELL_ERROR * norm_reach(changes)
-    defect = np.linalg.norm(rows @ rows.transpose(0, 2, 1) - np.eye(count), axis=(1, 2)) + np.sqrt(count) * size * lost
+    inverse_norm, count = np.linalg.norm(inverse, axis=(1, 2)), frame.shape[2]
+    lost = np.linalg.norm(rounding[:, :-1], axis=1) + CELL_ERROR * norm_bound(changes)
+    defect = (
+        np.linalg.norm(rows @ rows.transpose(0, 2, 1) - np.eye(count), axis=(1, 2))
+        + np.sqrt(count) * inverse_norm * lost
+    )
     columns, shifts = rows @ units, rows[:, None] @ changes
     first = operators @ columns[:, None] - shifts  # v_j
     last = operators[:, :, -1]  # e^T K_k
-    norm = (norm_reach(operators) + defect)[:, None]
-    after, defect, ways = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf), defect[:, None], _norms(first)
-    rest = norm_reach(last)[:, None] * norm * after * ways
+    norm = (norm_bound(operators) + defect)[:, None]
+    after, defect, first_norms = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf), defect[:, None], _norms(first)
+    rest = norm_bound(last)[:, None] * norm * after * first_norms
     rest = rest + after**2 * defect * (np.linalg.norm(columns, axis=1) + _norms(shifts)) + after * rounding
     quadratic = last[:, :, None, None] @ first[:, None]
     return Products(columns[:, -1], first[:, :, -1].transpose(0, 2, 1), np.moveaxis(quadratic[..., 0, :], -1, 1), rest)
@@ -157,19 +167,19 @@ def _norms(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.abs(columns @ columns.transpose(0, 1, 3, 2)).sum((2, 3)))
 
 
-def least_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n n_cables"]) -> Float[np.ndarray, "n"]:
+def lower_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n n_cables"]) -> Float[np.ndarray, "n"]:
     """Lower bounds over cells of the component of a wrench along c, less what some tensions give."""
     steps = cells.steps / cells.lengths[..., None]  # of L0 / L
     value, linear, quadratic = products.value[:, :-1], products.linear[:, :-1], products.quadratic[:, :-1]
-    second = -np.minimum(least_quadratic(quadratic), least_quadratic(-quadratic))
+    second = -np.minimum(smallest_quadratic(quadratic), smallest_quadratic(-quadratic))
     middle = products.value[:, -1] - (limits * value).sum(1)
     along = products.linear[:, -1] - (limits[..., None] * (linear + value[..., None] * steps)).sum(1)
     deviation = quadratic + linear[..., :, None] * steps[..., None, :]
-    bends = products.quadratic[:, -1] - (limits[..., None, None] * deviation).sum(1)
-    shift, radius = reach(steps), cells.radius[:, None]
+    quadratic_terms = products.quadratic[:, -1] - (limits[..., None, None] * deviation).sum(1)
+    shift, radius = largest_linear(steps), cells.radius[:, None]
     regularization = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
     cable_rests = products.rest[:, :-1]
-    maximum = np.abs(value) + reach(linear) + second + cable_rests
+    maximum = np.abs(value) + largest_linear(linear) + second + cable_rests
     rest = cable_rests * (1.0 + shift) + second * shift + maximum * regularization
     rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
-    return middle - reach(along) + least_quadratic(bends) - rest
+    return middle - largest_linear(along) + smallest_quadratic(quadratic_terms) - rest

@@ -3,7 +3,7 @@
 A cable is a segment from its exit E to its attachment point. While the robot moves by at most h, that point does too.
 On its pulley of radius r, E moves along the cable by r / f of the distance that A moves across the cable in the plane
 of the pulley, where f is the free length; and with this plane by at most 2 r / w of the distance that A moves out of
-it, where w is the distance of A from the swivel axis (`robots.model.pulleys`). Wherever A goes, E stays within a band
+it, where w is the distance of A from the swivel axis (`robots.model.pulleys`). Wherever A goes, E stays within a range
 of width 4 r and height 2 r.
 """
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 BATCH = 4096
-# Diagonal of the band within which exits lie, over the radius of the pulley.
-BAND = math.sqrt(20.0)
+# Diagonal of the range within which exits lie, over the radius of the pulley.
+EXIT_RANGE = math.sqrt(20.0)
 
 
 class Shifts(NamedTuple):
@@ -46,14 +46,14 @@ def shifts(
     robot: AnyRobot,
     positions: Float[np.ndarray, "n 3"],
     quaternions: Float[np.ndarray, "n 4"],
-    reach: Float[np.ndarray, "n"],
+    distance: Float[np.ndarray, "n"],
 ) -> Shifts:
     """Bounds of movements while robots move within their cells."""
     targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), batch_size=BATCH)
-    rays, maximum = targets - np.asarray(robot.base_points), reach[:, None]
+    rays, maximum = targets - np.asarray(robot.base_points), distance[:, None]
     if robot.pulleys is None:
         free = np.linalg.norm(rays, axis=2) - maximum
-        return Shifts(reach, np.zeros(len(reach)), unit_changes(maximum, free), free)
+        return Shifts(distance, np.zeros(len(distance)), unit_changes(maximum, free), free)
     radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
     high = (rays * axes).sum(2)
     wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
@@ -63,8 +63,8 @@ def shifts(
     wide = np.maximum(wide - maximum, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = maximum * np.fmax(radius / free, 2.0 * radius / wide)
-    exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
-    return Shifts(reach, exits.max(1), unit_changes(maximum, np.minimum(free, wide)), free)
+    exits = np.where(radius > 0.0, np.fmin(exits, EXIT_RANGE * radius), 0.0)
+    return Shifts(distance, exits.max(1), unit_changes(maximum, np.minimum(free, wide)), free)
 
 
 def leaving_points(
@@ -78,6 +78,6 @@ def leaving_points(
     return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, batch_size=BATCH)
 
 
-def unit_changes(reach: Float[np.ndarray, "n k"], length: np.ndarray) -> np.ndarray:
+def unit_changes(distance: Float[np.ndarray, "n k"], length: np.ndarray) -> np.ndarray:
     """Bound of the changes of unit vectors."""
-    return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)
+    return np.where(length > 0.0, np.minimum(distance / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

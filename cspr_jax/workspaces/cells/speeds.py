@@ -36,13 +36,13 @@ class CableSpeeds:
         robot: centred, z down, its arms from the origin of the platform frame; see `cable_speeds`.
         speed: largest speed of the origin, m/s.
         angular_speed: rad/s.
-        most: (n_cables,) largest speeds, m/s.
+        maximum: (n_cables,) largest speeds, m/s.
     """
 
     robot: AnyRobot
     speed: float
     angular_speed: float
-    most: np.ndarray
+    maximum: np.ndarray
 
     def margins(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
@@ -52,7 +52,7 @@ class CableSpeeds:
         columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=BATCH)
         forces = len(PATTERNS[self.robot.pattern].forces)
         along, about = (np.linalg.norm(part, axis=1) for part in (columns[:, :forces], columns[:, forces:]))
-        return self.most - (along * self.speed + about * self.angular_speed)
+        return self.maximum - (along * self.speed + about * self.angular_speed)
 
     def displaced(
         self, origins: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"], distance: float
@@ -76,7 +76,7 @@ class CableSpeeds:
 
         units, _, gradients = each(rays)
         rays = rays + distance * unit_vectors(gradients - (gradients * units).sum(2, keepdims=True) * units)
-        return self.most - each(rays)[1], np.linalg.norm(rays, axis=2)
+        return self.maximum - each(rays)[1], np.linalg.norm(rays, axis=2)
 
     def changes(self, moved: Shifts) -> Float[np.ndarray, "n n_cables"]:
         """Largest change of `margins` within cells."""
@@ -88,9 +88,9 @@ class CableSpeeds:
         return moved.units * (speed + arms * self.angular_speed)
 
 
-def cable_speeds(robot: AnyRobot, most: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
+def cable_speeds(robot: AnyRobot, maximum: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
     """Velocities that an effector must be able to have."""
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
         robot = dataclasses.replace(robot, platform_points=as_float64(points))
-    return CableSpeeds(robot, speed, angular_speed, np.broadcast_to(np.asarray(most, float), (robot.n_cables,)))
+    return CableSpeeds(robot, speed, angular_speed, np.broadcast_to(np.asarray(maximum, float), (robot.n_cables,)))

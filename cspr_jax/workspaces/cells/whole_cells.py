@@ -74,7 +74,7 @@ def proved_sides(
     left = np.flatnonzero(~result.proved & (sides != 0))
     if depth == 0 or len(left) == 0 or not half.any():
         return result
-    corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
+    corners = np.array(list(itertools.product(*[(-0.5, 0.5) if h else (0.0,) for h in half.max(0)])))
     inner = positions[left, None] + corners * half[left, None]
     part_sides = conditions.at(inner.reshape(-1, 3)).reshape(inner.shape[:2])
     result.mixed[left] = (part_sides == -sides[left, None]).any(1)

@@ -22,7 +22,7 @@ ZERO = 1e-9
 SHORT = 1e-9
 
 
-class WorstCocircuits(NamedTuple):
+class WorstFacets(NamedTuple):
     """Cocircuits, one a pose.
 
     Fields:
@@ -41,7 +41,7 @@ class WorstCocircuits(NamedTuple):
 
 
 @partial(jax.jit, static_argnames=("condition", "unbounded"))
-def worst_cocircuits(
+def worst_facets(
     matrices: Float[Array, "n dof n_cables"],
     wrenches: Float[Array, "k dof"],
     spreads: Float[Array, "l dof"],
@@ -50,7 +50,7 @@ def worst_cocircuits(
     *,
     condition: str,
     unbounded: Sequence[bool],
-) -> WorstCocircuits:
+) -> WorstFacets:
     """Cocircuits with the least slack, times the volume of the columns that they are normal to.
 
     This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
@@ -74,16 +74,18 @@ def worst_cocircuits(
             value = -jnp.min(others, axis=1)
             is_void, load = jnp.zeros(value.shape, bool), jnp.asarray(0)
         else:
-            reach = jnp.sum(jnp.where(along > 0.0, along * jnp.where(free, 0.0, high)[None], along * low[None]), axis=1)
-            value = reach - jnp.max(products, axis=1)
+            support = jnp.sum(
+                jnp.where(along > 0.0, along * jnp.where(free, 0.0, high)[None], along * low[None]), axis=1
+            )
+            value = support - jnp.max(products, axis=1)
             is_void = ((along > ZERO * largest) & free[None]).any(1)
         is_void = is_void | ~(largest[:, 0] > SHORT)
         value = jnp.where(value > 0.0, value / jnp.linalg.norm(normals, axis=1), value)
         worst = jnp.argmin(jnp.where(is_void, jnp.inf, value))
         if condition != "closure":
             load = jnp.argmax(products[worst])
-            value = reach - products[:, load]
+            value = support - products[:, load]
         weight = jnp.where(is_void, 0.0, jnp.maximum(-value, 0.0))
-        return WorstCocircuits(normals[worst], worst % len(chosen), load, weight @ normals)
+        return WorstFacets(normals[worst], worst % len(chosen), load, weight @ normals)
 
     return jax.vmap(one)(matrices)

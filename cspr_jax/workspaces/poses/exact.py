@@ -68,8 +68,8 @@ def margin_planes(
     bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
     rows, normals = rows[bounds], normals[bounds]
     sizes = np.abs(rows).sum(1)
-    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
-    return Planes(reach / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
+    support = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
+    return Planes(support / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
 
 
 def wrench_margin(
@@ -113,9 +113,9 @@ def _always_zero(components: np.ndarray, choices: CableSubsets) -> np.ndarray:
     # Return the number of components, beside those of a hyperplane's columns, that are zero at every pose of the robot.
     if choices.counts is None:
         return np.zeros(len(components), int)
-    size = components.shape[1] - choices.counts.shape[1]
+    n_chosen = components.shape[1] - choices.counts.shape[1]
     more: dict[tuple[int, ...], int] = {}
     for row, counts in zip(choices.table, choices.counts, strict=True):
-        support = tuple(sorted(row[size:][counts > 0.0].tolist()))
+        support = tuple(sorted(row[n_chosen:][counts > 0.0].tolist()))
         more[support] = int((counts == 0.0).sum())
     return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in components])

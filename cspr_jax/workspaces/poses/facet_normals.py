@@ -88,22 +88,22 @@ def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
     # Return the determinants of all choices of as many rows as columns.
     dof = len(columns[0])
     minors: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
-    for size, column in enumerate(columns[1:], 2):
+    for order, column in enumerate(columns[1:], 2):
         larger = {}
-        for rows in itertools.combinations(range(dof), size):
+        for rows in itertools.combinations(range(dof), order):
             terms = [column[row] * minors[rows[:i] + rows[i + 1 :]] for i, row in enumerate(rows)]
-            larger[rows] = _signed_sum(terms, [(-1) ** (i + size - 1) for i in range(size)])
+            larger[rows] = _signed_sum(terms, [(-1) ** (i + order - 1) for i in range(order)])
         minors = larger
     return minors
 
 
 def _laplace(head: dict, tail: dict, rows: Sequence[int], sign: int) -> Array:
     # Return the determinant of some rows by the minors of the first columns and those of the last.
-    terms, signs, size = list[Array](), list[int](), len(next(iter(head)))
-    for places in itertools.combinations(range(len(rows)), size):
-        rest = [place for place in range(len(rows)) if place not in places]
-        terms.append(head[tuple(rows[i] for i in places)] * tail[tuple(rows[i] for i in rest)])
-        signs.append(sign * (-1) ** (sum(places) + size * (size - 1) // 2))
+    terms, signs, order = list[Array](), list[int](), len(next(iter(head)))
+    for chosen in itertools.combinations(range(len(rows)), order):
+        rest = [index for index in range(len(rows)) if index not in chosen]
+        terms.append(head[tuple(rows[i] for i in chosen)] * tail[tuple(rows[i] for i in rest)])
+        signs.append(sign * (-1) ** (sum(chosen) + order * (order - 1) // 2))
     return _signed_sum(terms, signs)
 
 
@@ -155,19 +155,22 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     volume = dot(a[0], adjugate[0])
 
     def reduced(six):
-        # Return the pulls of the first three cables that cancel the force, times the volume, and the remaining moment.
-        pulls_on_force = [dot(row, six[:3]) for row in adjugate]
-        left = tuple(volume * six[3 + i] - sum(c[j][i] * pulls_on_force[j] for j in range(3)) for i in range(3))
-        return pulls_on_force, left
+        # Return the tensions of three cables that cancel the force, times the volume, and the remaining moment.
+        tensions_for_force = [dot(row, six[:3]) for row in adjugate]
+        left = tuple(volume * six[3 + i] - sum(c[j][i] * tensions_for_force[j] for j in range(3)) for i in range(3))
+        return tensions_for_force, left
 
-    pulls, lefts = zip(*[reduced(column) for column in columns[3:]], strict=True)
+    first_tensions, lefts = zip(*[reduced(column) for column in columns[3:]], strict=True)
     inner = (cross(lefts[1], lefts[2]), cross(lefts[2], lefts[0]), cross(lefts[0], lefts[1]))
     determinant = dot(lefts[0], inner[0])
     tensions = []
     for wrench in wrenches:
-        pulls_on_force, left = reduced(wrench)
+        tensions_for_force, left = reduced(wrench)
         last = [dot(row, left) for row in inner]
-        first = [pulls_on_force[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
+        first = [
+            tensions_for_force[j] * determinant - sum(first_tensions[n][j] * last[n] for n in range(3))
+            for j in range(3)
+        ]
         tensions.append([*first, *(volume * x for x in last)])
     # All tensions are products of two remaining moments and of factors not above 1.
     maximum = largest([jnp.abs(x) for left in lefts for x in left])
@@ -179,11 +182,11 @@ def base_order(matrices: Float[np.ndarray, "n 6 n_cables"]) -> tuple[int, ...]:
     _check_finite(matrices)
     count = matrices.shape[2]
 
-    def size(chosen, rows):
+    def determinant(chosen, rows):
         return np.quantile(np.abs(np.linalg.det(matrices[:, :rows][:, :, list(chosen)])), 0.02)
 
-    triples = {chosen: size(chosen, 3) for chosen in itertools.combinations(range(count), 3)}
-    sixes = {chosen: size(chosen, CABLES) for chosen in itertools.combinations(range(count), CABLES)}
+    triples = {chosen: determinant(chosen, 3) for chosen in itertools.combinations(range(count), 3)}
+    sixes = {chosen: determinant(chosen, CABLES) for chosen in itertools.combinations(range(count), CABLES)}
 
     def worth(pair):
         six, three = pair

@@ -88,8 +88,8 @@ def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Arra
         return tuple(x * inverse for x in ray), loss
     shape = inverse.shape[0], inverse.shape[1]
     base, axes = _down(robot.base_points, shape), _down(robot.pulleys.axes, shape)
-    way = exit_lanes(base, axes, jnp.broadcast_to(robot.pulleys.radius[:, None], shape), target).direction
-    return tuple(-x for x in way), loss
+    exit_of_cable = exit_lanes(base, axes, jnp.broadcast_to(robot.pulleys.radius[:, None], shape), target).direction
+    return tuple(-x for x in exit_of_cable), loss
 
 
 @jax.jit
@@ -117,8 +117,8 @@ def scales(robot: AnyRobot) -> Bool[np.ndarray, "dof"]:
 
 def at_rest(position: Float[Array, "3"], quaternion: Float[Array, "4"]) -> State:
     """State of an effector at rest."""
-    still = jnp.zeros_like(position)
-    return State(position, still, still, matrix(quaternion), still, still, quaternion)
+    zero = jnp.zeros_like(position)
+    return State(position, zero, zero, matrix(quaternion), zero, zero, quaternion)
 
 
 @jax.jit
@@ -146,8 +146,8 @@ def cable_lengths(
     targets, pulleys = attachments(robot, positions, quaternions), robot.pulleys
     if pulleys is None:
         return jnp.linalg.norm(robot.base_points[None] - targets, axis=2)
-    way = jax.vmap(lambda x: exits(robot.base_points, pulleys.axes, pulleys.radius, x))(targets)
-    return way.wrapped + way.free
+    exit_of_cable = jax.vmap(lambda x: exits(robot.base_points, pulleys.axes, pulleys.radius, x))(targets)
+    return exit_of_cable.wrapped + exit_of_cable.free
 
 
 @jax.jit

@@ -27,7 +27,7 @@ from cspr_jax.workspaces.poses.facet_normals import (
     product,
     relation,
 )
-from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, CocircuitLimits, Wrenches, length, one_norm
+from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, FacetLimits, Wrenches, length, one_norm
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Shaped
@@ -67,10 +67,12 @@ def by_normals(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
     )
     noise = jnp.asarray(EPSILONS * jnp.finfo(template.dtype).eps, template.dtype) * loss
-    reach = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
-    size = _size(wrenches)
+    tension_bound = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(
+        tension_limits.low
+    )
+    wrench_bound = _wrench_bound(wrenches)
 
-    def pull(row, limits):
+    def facet(row, limits):
         chosen = [[_row(component, row[i]) for component in components] for i in range(dof - 1)]
         across = normal(chosen) if chosen else [jnp.ones_like(template)]
         rest = [[_row(component, k) for component in components] for k in row[dof - 1 :]]
@@ -79,23 +81,27 @@ def by_normals(
         over = one_norm(entries)
         if measure == "capacity":
             over = length([x * tension_limits.measure[k] for k, x in enumerate(across)])
-        error = 2.0 * noise * (scale + size)
-        return _pull(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
+        error = 2.0 * noise * (scale + wrench_bound)
+        return _facet_limits(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
 
     rest = choices.table[:, dof - 1 :]
-    limits = tension_limits.low[rest], tension_limits.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
-    return _least(pull, choices.table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)
+    limits = tension_limits.low[rest], tension_limits.high[rest], choices.counts, jnp.sum(tension_bound[rest], axis=1)
+    return _smallest_margin(
+        facet, choices.table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded
+    )
 
 
-def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> CocircuitLimits:
+def _facet_limits(
+    entries: Sequence[Array], low, high, counts, divisor: Array, noise: Array, error: Array
+) -> FacetLimits:
     noises = [noise] * len(entries)
     if counts is not None:  # components that are zero at every pose have no rounding
         entries, noises = ([x * counts[i] for i, x in enumerate(values)] for values in (entries, noises))
-    return CocircuitLimits(entries, list(low), list(high), size, noises, error)
+    return FacetLimits(entries, list(low), list(high), divisor, noises, error)
 
 
-def _size(wrenches: Wrenches) -> Array:
-    # Return an upper bound of the size of a wrench.
+def _wrench_bound(wrenches: Wrenches) -> Array:
+    # Return an upper bound of the norm of a wrench.
     parts = [one_norm(point) for point in wrenches.points]
     spreads = [jnp.sum(axes) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
     return sum(spreads, largest(parts))
@@ -105,18 +111,18 @@ def _row(array: Array, k: Array) -> Array:
     return lax.dynamic_index_in_dim(array, k, 0, keepdims=False)
 
 
-def _least(
-    pull, table: np.ndarray, limits, template: Array, tension_limits: TensionLimits, *, measure: str, is_bounded: bool
+def _smallest_margin(
+    facet, table: np.ndarray, limits, template: Array, tension_limits: TensionLimits, *, measure: str, is_bounded: bool
 ) -> Array:
     # Return the least margin of all cocircuits.
-    judged = margins.bounded_margin if is_bounded else margins.free_margin
+    margin_of = margins.bounded_margin if is_bounded else margins.free_margin
 
     def step(bounds, each):
-        facet_normal, asking = pull(*each)
+        facet_normal, asking = facet(*each)
         if measure == "closure":
             lower, upper = margins.closure_margin(facet_normal)
         else:
-            lower, upper = judged(facet_normal, *asking)
+            lower, upper = margin_of(facet_normal, *asking)
         minimum = jnp.minimum(jnp.real(bounds), lower), jnp.minimum(jnp.imag(bounds), upper)
         return lax.complex(*minimum), None
 
@@ -178,8 +184,8 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
     held = [x * inverse for x in last]
     rounding = jnp.asarray(BLOCK_EPSILONS * jnp.finfo(common.dtype).eps, common.dtype) * loss * scale
     most_held = largest([jnp.abs(x) for x in held])
-    size = sum((jnp.abs(x) for x in wrench), zero)
-    uncertain = rounding * (size + most_held) * jnp.abs(inverse)
+    wrench_norm = sum((jnp.abs(x) for x in wrench), zero)
+    uncertain = rounding * (wrench_norm + most_held) * jnp.abs(inverse)
     noise = rounding if count else zero
     if count == MOST_OTHERS:
         noise = 4.0 * noise * largest([jnp.abs(x) for row in rows for x in row])
@@ -194,17 +200,17 @@ def by_null_space(
     """Margins of poses by the relations among rows of the null space."""
     template = space.loss
     finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
-    reach = jnp.sum(finite) + space.largest
+    tension_bound = jnp.sum(finite) + space.largest
 
-    def pull(row, limits):
+    def facet(row, limits):
         rows = [[_row(part, k) for part in space.rows] for k in row]
         entries = relation(rows) if space.rows else [jnp.ones_like(template)]
         low, high, counts = limits
-        size = one_norm(entries)
+        norm = one_norm(entries)
         asking = product(entries, [_row(space.held, k) for k in row])
-        error = 2.0 * space.noise * reach + size * space.loss
-        return _pull(entries, low, high, counts, size, space.noise, error), (asking, -asking)
+        error = 2.0 * space.noise * tension_bound + norm * space.loss
+        return _facet_limits(entries, low, high, counts, norm, space.noise, error), (asking, -asking)
 
     table = choices.table
     limits = tension_limits.low[table], tension_limits.high[table], choices.counts
-    return _least(pull, table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)
+    return _smallest_margin(facet, table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)

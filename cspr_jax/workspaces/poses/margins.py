@@ -37,23 +37,23 @@ class Wrenches(NamedTuple):
     ellipsoids: Sequence[Array] = ()
 
 
-class CocircuitLimits(NamedTuple):
+class FacetLimits(NamedTuple):
     """A cocircuit with the limits of its cables.
 
     Fields:
         entries: components that need not be zero, of any common length.
         low: smallest tensions of these cables, () each, N.
         high: largest tensions, () each, N; inf where there is none.
-        size: divisor of the margin: the sum of the components' sizes for tensions, the length of the normal for the
+        divisor: of the margin: the sum of the absolute components for tensions, the length of the normal for the
             capacity margin.
         noises: errors of the components.
-        error: error of the difference between tensions and wrenches along the cocircuit, in units of size times N.
+        error: of the difference between tensions and wrenches along the cocircuit, in units of the divisor times N.
     """
 
     entries: Sequence[Array]
     low: Sequence[Array]
     high: Sequence[Array]
-    size: Array
+    divisor: Array
     noises: Sequence[Array]
     error: Array
 
@@ -62,7 +62,7 @@ Bounds = tuple[Array, Array]
 
 
 def one_norm(entries: Sequence[Array]) -> Float[Array, "..."]:
-    """Sum of the sizes of components."""
+    """Sum of the absolute values of components."""
     parts = [jnp.abs(entry) for entry in entries]
     return sum(parts[1:], parts[0])
 
@@ -85,44 +85,44 @@ def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
     return maximum, minimum
 
 
-def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
+def bounded_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
     """Bounds of the margin of one cocircuit whose cables all have a largest tension."""
-    limits = list(zip(pull.entries, pull.low, pull.high, strict=True))
+    limits = list(zip(facet.entries, facet.low, facet.high, strict=True))
     ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
     middles = [(0.5 * (high + low)) * y for y, low, high in limits]
     middle = sum(middles[1:], middles[0])
-    slack = sum(ranges[1:], ranges[0]) - jnp.maximum(most - middle, least + middle)
-    return _between(pull, slack, slack)
+    slack = sum(ranges[1:], ranges[0]) - jnp.maximum(support - middle, opposite + middle)
+    return _between(facet, slack, slack)
 
 
-def _between(pull: CocircuitLimits, sure: Array, possible: Array) -> Bounds:
-    # Divide by a size that has an error as well.
-    inverse = 1.0 / pull.size
-    lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
+def _between(facet: FacetLimits, sure: Array, possible: Array) -> Bounds:
+    # Divide by a divisor that has an error as well.
+    inverse = 1.0 / facet.divisor
+    lower, upper, loss = sure * inverse, possible * inverse, sum(facet.noises[1:], facet.noises[0])
     less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
-    return lower - (pull.error + less) * inverse, upper + (pull.error + more) * inverse
+    return lower - (facet.error + less) * inverse, upper + (facet.error + more) * inverse
 
 
-def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
+def free_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
     """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
 
     A component that may be zero but for rounding frees the upper bound, but not the lower one.
     """
     lower, upper = list[Array](), list[Array]()
-    for sign, demand in ((1.0, most), (-1.0, least)):
+    for sign, demand in ((1.0, support), (-1.0, opposite)):
         sure = possible = -demand
-        for entry, noise, low, high in zip(pull.entries, pull.noises, pull.low, pull.high, strict=True):
+        for entry, noise, low, high in zip(facet.entries, facet.noises, facet.low, facet.high, strict=True):
             y = sign * entry
             sure = sure + jnp.where(y > noise, y * high, y * low)
             possible = possible + jnp.where(y > -noise, (y + 2.0 * noise) * high, y * low)
         lower.append(sure)
         upper.append(possible)
-    return _between(pull, jnp.minimum(*lower), jnp.minimum(*upper))
+    return _between(facet, jnp.minimum(*lower), jnp.minimum(*upper))
 
 
-def closure_margin(pull: CocircuitLimits) -> Bounds:
+def closure_margin(facet: FacetLimits) -> Bounds:
     """Bounds of the margin of wrench closure of one cocircuit."""
-    fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
-    inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
-    error = 2.0 * largest(pull.noises) * inverse
+    fewest = jnp.minimum(largest(facet.entries), largest([-entry for entry in facet.entries]))
+    inverse = 1.0 / largest([jnp.abs(entry) for entry in facet.entries])
+    error = 2.0 * largest(facet.noises) * inverse
     return fewest * inverse - error, fewest * inverse + error

@@ -129,7 +129,7 @@ def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] |
     units = np.asarray(table.orientations, float)
     if len(units) not in (1, count):
         allowed = f"must be one, or {count}" if count > 1 else "must be one"
-        raise InputError("orientations", None, allowed, fault=f"{len(units)} of them")
+        raise InputError("orientations", None, allowed, problem=f"{len(units)} of them")
     sizes = np.linalg.norm(units, axis=1, keepdims=True)
     odd = np.flatnonzero(np.abs(sizes[:, 0] - 1.0) > UNIT_NORM)
     if len(odd):

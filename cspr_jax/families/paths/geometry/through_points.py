@@ -28,7 +28,7 @@ def chords(
 ) -> Float[np.ndarray, "n-1"]:
     """Distances between consecutive points; where only the orientation changes, the angle."""
     if len(points) < 2:
-        raise InputError("points", None, "must be two or more", fault=f"{len(points)} of them")
+        raise InputError("points", None, "must be two or more", problem=f"{len(points)} of them")
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if quaternions is not None:
         halves = half_angles(continuous(quaternions))
@@ -67,5 +67,5 @@ def through_points(
     speeds = np.linalg.norm(values(fine, 1), axis=1)
     if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():
         i = int(np.argmin(speeds)) // SAMPLES
-        raise InputError("points", None, "must make a curve that turns back nowhere", fault=f"behind points[{i}]")
+        raise InputError("points", None, "must make a curve that turns back nowhere", problem=f"behind points[{i}]")
     return [Track(s, place, first, second, np.full(len(lengths), np.inf), s)]

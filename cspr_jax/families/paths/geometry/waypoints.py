@@ -158,7 +158,9 @@ class MotionSequence:
         bad = np.flatnonzero(jump > MEETS / STILL * still)
         if len(bad):
             name = f"segment {smooth[int(bad[0]) + 1].motion + 1}"
-            raise InputError(name, None, "must go on at the same velocity", fault=f"it jumps by {jump[bad[0]]:.3g} m/s")
+            raise InputError(
+                name, None, "must go on at the same velocity", problem=f"it jumps by {jump[bad[0]]:.3g} m/s"
+            )
 
     def _stops(
         self, smooth: list[SmoothPart], number: np.ndarray, fraction: np.ndarray, width: np.ndarray, still: float

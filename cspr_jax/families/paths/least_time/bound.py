@@ -42,7 +42,7 @@ def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]
     return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
     # Multipliers of what the half-planes are made of, from those of the half-planes.
     def one(place: Places, multipliers: Array) -> tuple[Array, Array, Array]:
@@ -61,7 +61,7 @@ def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> t
     return jax.vmap(one)(*nodes)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
     # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
     def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:

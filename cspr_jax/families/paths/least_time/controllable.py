@@ -138,7 +138,7 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
     return jnp.maximum(low, 0.0), jnp.where(never, -1.0, jnp.minimum(high, cap))
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def fastest(
     sides: tuple[Rows, Rows],
     width: Float[Array, "n_cells n_paths"],

@@ -148,7 +148,7 @@ def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np
     return multipliers._replace(wrench=multipliers.wrench + change)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _momentum(robot: AnyRobot, nodes: tuple[Places]) -> Array:
     return jax.vmap(lambda place: unit_wrenches(robot, state_at(place)).momentum)(*nodes)
 
@@ -176,7 +176,7 @@ def _along(
     return dot(_line(start, end), second_derivative) - dot(_steep(start, end, width), momentum)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
     # Tell what each cell adds to the bound, what it takes from it, how much weight its multipliers lack, and by how
     # much y . a' - y' . a is negative.

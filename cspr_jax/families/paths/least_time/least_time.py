@@ -18,7 +18,7 @@ from cspr_jax.families.paths.least_time.smooth import SectionEnds, Smooth, below
 from cspr_jax.families.paths.least_time.tightening import BindingName, CellSlacks, Trial, together
 from cspr_jax.families.paths.least_time.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
 from cspr_jax.motion.problem import Problem
-from cspr_jax.runtime.progress import Pace
+from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.runtime.stages import within
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
@@ -98,7 +98,7 @@ def least_times_along(
     problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
 ) -> Iterator[LeastTime]:
     """Find the fastest motions along sections, however many, and announce how far that is."""
-    count, pace = len(sections), Pace()
+    count, pace = len(sections), RateEstimate()
     for first in range(0, count, batch):
         pace.advance(first, count)
         part, left = slice(first, first + batch), pace.left()

@@ -139,7 +139,7 @@ def state_at(place: Places) -> State:
     return piece_state(*place)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> Rows:
     return jax.vmap(lambda place, speed: path_rows(robot, limits, state_at(place), speed))(*arguments)
 
@@ -180,7 +180,7 @@ def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarr
     return end
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.proof_options())
 def _derivatives(places: Places) -> Any:
     def one(place: Places):
         rates = [piece_values(place.position, place.fraction, place.width)]

@@ -22,12 +22,11 @@ from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
 from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.motions.motion import draw_limits, shade_failing
 from cspr_jax.outputs.plots.motions.trajectory import add_tension_bar, name_spools
-from cspr_jax.outputs.plots.robots.bodies_in_space import draw_bodies
-from cspr_jax.outputs.plots.robots.obstacles import AREA, points_of
+from cspr_jax.outputs.plots.robots.obstacles import AREA, draw_bodies, points_of
 from cspr_jax.outputs.plots.robots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.style.fitting import fit, legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look
-from cspr_jax.outputs.plots.style.scene import colours_of_tension, fill_places, set_space, shape_of
+from cspr_jax.outputs.plots.style.scene import colours_of_tension, fill_panels, set_space, shape_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.quantities import FAILURES
 
@@ -35,13 +34,13 @@ ENDINGS = (".gif", ".mp4", ".html")
 RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
 # Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
 # are whole hundredths of a second. The pictures of a page are whole ones each.
-RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
-SIZE, DPI = (10.0, 7.2), 90
+RATES, LARGEST_COUNT, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
+FIGURE_SIZE, DPI = (10.0, 7.2), 90
 # Height over width below which a robot lies above its tensions, and not beside them.
 WIDE = 0.85
 # Browsers hardly open a page of more MB than this.
 LARGEST = 100.0
-MARK = "#D55E00"
+TIME_COLOUR = "#D55E00"
 # Lines behind the clock would cross its digits.
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
@@ -51,7 +50,7 @@ def film(
     title: str,
     columns: Mapping[str, np.ndarray],
     robot_file: RobotFile,
-    keys: PlanFile,
+    plan_file: PlanFile,
     speed: float = 1.0,
 ) -> bytes:
     """A film of a motion."""
@@ -61,15 +60,15 @@ def film(
         raise InputError("--speed", speed, "a number > 0")
     time = np.asarray(columns["t"], float)
     seconds = float(time[-1] - time[0]) / speed
-    maximum = OF_PAGES if ending == ".html" else MOST
+    maximum = OF_PAGES if ending == ".html" else LARGEST_COUNT
     rate = next((rate for rate in RATES if seconds * rate <= maximum), RATES[-1])
     # The end is shown, at most a part of a picture too late.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
-    instants = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
-    rows = np.clip(np.searchsorted(time, instants - 1e-9), 0, len(time) - 1)
+    times = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
+    rows = np.clip(np.searchsorted(time, times - 1e-9), 0, len(time) - 1)
     writer = _writer(ending, rate)
     stage("film")
-    picture = _Picture(title, columns, robot_file, keys, rows)
+    picture = _Picture(title, columns, robot_file, plan_file, rows)
     with tempfile.TemporaryDirectory() as folder, matplotlib.rc_context(rc=_settings(ending)):
         path = Path(folder) / f"film{ending}"
         with writer.saving(picture.figure, str(path), DPI):
@@ -117,11 +116,19 @@ class _Picture:
     # This figure has artists that are moved from row to row.
 
     def __init__(
-        self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray
+        self,
+        title: str,
+        columns: Mapping[str, np.ndarray],
+        robot_file: RobotFile,
+        plan_file: PlanFile,
+        rows: np.ndarray,
     ) -> None:
         all_rows = np.arange(len(columns["t"]))
-        self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
-        self._bodies, self._failing = keys.bodies, {name: columns[name] for name in FAILURES if name in columns}
+        self.robot, self._path = (
+            moving(columns, robot_file, rows, plan_file),
+            moving(columns, robot_file, all_rows).position,
+        )
+        self._bodies, self._failing = plan_file.bodies, {name: columns[name] for name in FAILURES if name in columns}
         self._flight_time, self._flight = columns.get("flight_t", np.empty(0)), columns.get("flight_position")
         self._columns = columns
         self._rows, self._time = rows, np.asarray(columns["t"], float)
@@ -131,32 +138,32 @@ class _Picture:
         self._largest = float(finite.max(initial=0.0)) or 1.0
         self._norm = Normalize(0.0, self._largest)
         self._colours = colours_of_tension()
-        self.figure = MovingFigure(figsize=SIZE, layout="constrained")
-        places = self._places()
+        self.figure = MovingFigure(figsize=FIGURE_SIZE, layout="constrained")
+        points = self._drawn_points()
         # A robot that is wide gets the width, one that is high the height.
-        if shape_of(places) < WIDE:
+        if shape_of(points) < WIDE:
             grid = self.figure.add_gridspec(2, 1, height_ratios=[1.0, 0.36])
         else:
             grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 0.8])
         self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
-        self._draw_space(places, is_down=robot_file.z_axis == "down")
-        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
+        self._draw_space(points, is_down=robot_file.z_axis == "down")
+        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, plan_file))
         self.figure.suptitle(title)
         # Lay the figure out once: places of axes do not change.
         self.show(0)
         fit(self.figure)
-        fill_places(self.figure)
+        fill_panels(self.figure)
         of_cables = [*self.cables, *self._edges, self._mass]
-        self.figure.settle([self._flown, self.object, self._behind, *of_cables, self._mark, self._clock], DPI)
+        self.figure.draw_background([self._flown, self.object, self._behind, *of_cables, self._mark, self._clock], DPI)
 
-    def _places(self) -> np.ndarray:
-        of_robot = [self.robot.ways.reshape(-1, 3), self.robot.corners.reshape(-1, 3)]
+    def _drawn_points(self) -> np.ndarray:
+        of_robot = [self.robot.cable_points.reshape(-1, 3), self.robot.corners.reshape(-1, 3)]
         flight = np.empty((0, 3)) if self._flight is None else self._flight
         return np.concatenate([*of_robot, self._path, flight, *map(points_of, self._bodies)])
 
-    def _draw_space(self, places: np.ndarray, *, is_down: bool) -> None:
+    def _draw_space(self, points: np.ndarray, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
-        set_space(space, places, is_down=is_down)
+        set_space(space, points, is_down=is_down)
         draw_bodies(space, self._bodies, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
         name_spools(space, robot.base)
@@ -189,7 +196,7 @@ class _Picture:
             panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
         draw_limits(panel, limits, self.tension, "N")
         shade_failing(panel, self._failing, "tension")
-        self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
+        self._mark = panel.axvline(self._time[0], color=TIME_COLOUR, linewidth=1.8)
         panel.set(xlabel="time (s)", ylabel="tension (N)")
         panel.margins(x=0.01)
         panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
@@ -201,17 +208,17 @@ class _Picture:
         row = self._rows[number]
         robot: Moving = self.robot
         for k, cable in enumerate(self.cables):
-            cable.set_data_3d(*robot.ways[number, k].T)
+            cable.set_data_3d(*robot.cable_points[number, k].T)
             cable.set_color(self._colours(self._norm(self.tension[row, k])))
         for k, edge in enumerate(self._edges):
             edge.set_data_3d(*robot.corners[number, 2 * k : 2 * k + 2].T)
         self._mass.set_data_3d(*robot.position[number][:, None])
         self._behind.set_data_3d(*self._path[: row + 1].T)
-        instant = float(self._time[row])
-        if self._flight is not None and instant >= self._flight_time[0]:
-            place = [np.interp(instant, self._flight_time, values) for values in self._flight.T]
-            behind = self._flight[self._flight_time < instant]
-            self._flown.set_data_3d(*np.vstack([behind, place]).T)
-            self.object.set_data_3d(*np.transpose([place]))
-        self._mark.set_xdata([instant, instant])
-        self._clock.set_text(f"t = {instant:.2f} s")
+        time = float(self._time[row])
+        if self._flight is not None and time >= self._flight_time[0]:
+            position = [np.interp(time, self._flight_time, values) for values in self._flight.T]
+            behind = self._flight[self._flight_time < time]
+            self._flown.set_data_3d(*np.vstack([behind, position]).T)
+            self.object.set_data_3d(*np.transpose([position]))
+        self._mark.set_xdata([time, time])
+        self._clock.set_text(f"t = {time:.2f} s")

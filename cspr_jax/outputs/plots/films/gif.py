@@ -33,8 +33,8 @@ class GifWriter(AbstractMovieWriter):
     def finish(self) -> None:
         """Write the file."""
         last = len(self._pictures) - 1
-        places = np.unique(np.linspace(0, last, SAMPLES).round().astype(int))
-        colours = shared_colours([self._pictures[place] for place in places])
+        indices = np.unique(np.linspace(0, last, SAMPLES).round().astype(int))
+        colours = shared_colours([self._pictures[i] for i in indices])
         nearest = np.full(256**3, -1, np.int16)
         first, *others = (_in_colours(picture, colours, nearest) for picture in self._pictures)
         first.save(self.outfile, "gif", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class MovingFigure(Figure):
     """Pictures of the same axes; writers of films get them by `savefig`."""
 
-    def settle(self, moving: Collection[Artist], dpi: float) -> None:
+    def draw_background(self, moving: Collection[Artist], dpi: float) -> None:
         """Draw what lies behind the artists that move."""
         self.set_dpi(dpi)
         self._agg = FigureCanvasAgg(self)
@@ -49,7 +49,7 @@ def _in_front(panel: Any, moving: Collection[Artist]) -> list[Artist]:
     # Return what the panel draws from its first moving artist on, which would else lie behind it. A legend beside the
     # panel's area meets nothing that moves, and takes as long to draw as all of that.
     drawn = sorted((artist for artist in panel.get_children() if artist is not panel.patch), key=Artist.get_zorder)
-    first = next((place for place, artist in enumerate(drawn) if artist in moving), len(drawn))
+    first = next((index for index, artist in enumerate(drawn) if artist in moving), len(drawn))
     return [
         artist
         for artist in drawn[first:]

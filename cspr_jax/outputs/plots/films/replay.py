@@ -1,4 +1,4 @@
-"""A plan beside its motion in MuJoCo: both paths, and over time how far paths and tensions are apart."""
+"""A plan beside its motion in MuJoCo: both paths, and over time how far paths and tensions deviate."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from cspr_jax.outputs.plots.style.fitting import legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, line_look
 from cspr_jax.outputs.table_layout import two_digits
 
-# Share of the length of the path that typed digits may leave across a plane.
+# Fraction of the length of the path that typed digits may leave across a plane.
 ONE_PLANE = 1e-9
 BOUNDARIES = 200  # of longer plans the lines would hide the rest
 RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
@@ -22,16 +22,16 @@ WINDOWS = 250  # of time, each with its largest deviation
 def replay_figure(replay: PlayedPlan) -> Figure:
     """Planned and played path, and deviations of path and tensions."""
     is_planar = np.ptp(replay.position[:, 1]) <= ONE_PLANE * np.ptp(replay.position[:, 0])
-    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["path", "path"], ["tension", "tension"]]
+    layout: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["path", "path"], ["tension", "tension"]]
     figure = Figure(figsize=(10.0, 8.5), layout="constrained")
-    drawn = figure.subplot_mosaic(places, height_ratios=[1.2, 0.9, 0.9])
+    drawn = figure.subplot_mosaic(layout, height_ratios=[1.2, 0.9, 0.9])
     for name, j in (("xy", 1), ("xz", 2)):
         if name in drawn:
             _paths(drawn[name], replay, j)
     if replay.z_axis == "down":
         drawn["xz"].invert_yaxis()
-    ways = {"each segment from its start": replay.path_deviation, "all in one go": replay.through_deviation}
-    _deviations(drawn["path"], replay, ways)
+    deviations = {"each segment from its start": replay.path_deviation, "all in one go": replay.through_deviation}
+    _deviations(drawn["path"], replay, deviations)
     drawn["path"].set_ylabel("path off the plan (m)")
     cables = {f"cable {k + 1}": values for k, values in enumerate(np.abs(replay.tension_deviation).T)}
     _deviations(drawn["tension"], replay, cables)
@@ -45,12 +45,12 @@ def replay_figure(replay: PlayedPlan) -> Figure:
 
 
 def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
-    ways: tuple[tuple[str, np.ndarray, dict[str, Any]], ...] = (
+    curves: tuple[tuple[str, np.ndarray, dict[str, Any]], ...] = (
         ("planned", replay.position, {"color": "black", "linewidth": 2.2, "alpha": 0.35}),
         ("played", replay.played.position, {"color": COLOURS[1], "linewidth": 1.0, "linestyle": "--"}),
     )
-    for name, way, look in ways:
-        panel.plot(way[:, 0], way[:, j], label=name, **look)
+    for name, path, style in curves:
+        panel.plot(path[:, 0], path[:, j], label=name, **style)
     panel.set_xlabel("x (m)")
     panel.set_ylabel(f"{'xyz'[j]} (m)")
     panel.set_aspect("equal", adjustable="datalim")

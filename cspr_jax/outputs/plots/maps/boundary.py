@@ -19,7 +19,7 @@ MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "leng
 # Reasons to be outside whose margins files of earlier versions do not hold.
 LATER = {"floor_margin": Verdict.BELOW_FLOOR, "length_margin": Verdict.CABLE_TOO_LONG}
 WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
-# Share of the distance between two points by which the boundary keeps off the points.
+# Fraction of the distance between two points by which the boundary keeps off the points.
 OFF = 1e-6
 # Cuts of a simplex: each piece joins edges, named by their corners inside (first number) and outside (second). In a
 # simplex that is right-handed in the order inside, outside, triangles turn their outer side to the outside.
@@ -99,7 +99,7 @@ def boundary(sides: BoundarySides) -> Boundary:
 
 def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:
     # Each cell that is cut gives d! paths from its first corner to its last, one axis after the other: (n, d + 1)
-    # places in the flat grid, and 1 or -1 for their hand.
+    # indices in the flat grid, and 1 or -1 for their hand.
     count = is_in.ndim
     lower = np.arange(is_in.size).reshape(is_in.shape)[(slice(-1),) * count].reshape(-1)
     steps = np.array([int(np.prod(is_in.shape[k + 1 :])) for k in range(count)])
@@ -149,7 +149,7 @@ def step_of(sides: BoundarySides) -> Float[np.ndarray, "n 3 2"]:
     """The part of a plane in which the boundary may lie: between neighbours on different sides."""
     is_in = sides.verdict == 0
     grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
-    corners = np.concatenate([places for places, _ in _simplices(is_in)])
+    corners = np.concatenate([simplices for simplices, _ in _simplices(is_in)])
     inside = is_in.reshape(-1)[corners]
     return grid[corners[inside.any(1) & ~inside.all(1)]]
 

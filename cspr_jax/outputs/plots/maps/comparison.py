@@ -14,7 +14,7 @@ from matplotlib.path import Path as Path2D
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.maps.boundary import BoundarySides, outlines, sides_of, step_of
 from cspr_jax.outputs.plots.maps.conditions import conditions
-from cspr_jax.outputs.plots.maps.marks import mark
+from cspr_jax.outputs.plots.maps.marks import draw_marks
 from cspr_jax.outputs.plots.robots.obstacles import draw_obstacles
 from cspr_jax.outputs.plots.robots.robot_at import robot_of
 from cspr_jax.outputs.plots.selection import SAME
@@ -27,8 +27,8 @@ PLANES = [["x", "y"], ["x", "z"], ["y", "z"]]
 SPACE = ("x", "y", "z")
 SIDE, ALONE = 3.1, 5.2  # inches, the longer side of a panel
 # Spools are shown if the panels do not get longer than this many times the grid.
-STRETCH, MARGIN = 1.5, 0.04
-BAND = 0.18  # opacity
+LARGEST_RATIO, MARGIN = 1.5, 0.04
+OPACITY = 0.18  # opacity
 _END: dict[str, Any] = {"linestyle": ":", "linewidth": 0.7}
 
 
@@ -48,7 +48,7 @@ class Compared(NamedTuple):
     at: dict[str, int]
 
     @property
-    def place(self) -> dict[str, float]:
+    def coordinates(self) -> dict[str, float]:
         """Coordinates that are the same in the whole picture."""
         fixed = [axis for axis in self.result.axes if axis not in self.across]
         return {axis: float(self.result.axes[axis][self.at[axis]]) for axis in fixed}
@@ -62,7 +62,7 @@ def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
     over = next((axis for axis in compared[0].across if axis not in plane), None)
     heights = np.zeros(1) if over is None else _heights(compared, over)
     box = _box(compared, plane)
-    figure = Figure(figsize=_size(box, len(heights), len(compared)), layout="constrained")
+    figure = Figure(figsize=_figure_size(box, len(heights), len(compared)), layout="constrained")
     drawn, bottom, left = panels(figure, len(heights))
     titles = [""] if over is None else values(first, over, heights)
     legend: dict[str, Artist] = {}
@@ -70,10 +70,10 @@ def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
         panel.set(xlim=box[:, 0], ylim=box[:, 1], title=title)
         panel.set_aspect("equal")
         panel.grid(alpha=0.3)
-        place = compared[0].place | ({} if over is None else {over: float(height)})
+        coordinates = compared[0].coordinates | ({} if over is None else {over: float(height)})
         for one in compared:
-            legend |= draw_obstacles(panel, one.result, plane, place)
-        legend |= mark(panel, first, "verdict", plane, place)
+            legend |= draw_obstacles(panel, one.result, plane, coordinates)
+        legend |= draw_marks(panel, first, "verdict", plane, coordinates)
         for i, one in enumerate(compared):
             current = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
             legend |= _outline(panel, sides_of(one.result, plane, one.at | current), i)
@@ -83,7 +83,7 @@ def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
         panel.set_xlabel(axis_label(first, plane[0]))
     for panel in left:
         panel.set_ylabel(axis_label(first, plane[1]))
-    legend["band: step of the grid"] = Patch(facecolor="black", alpha=BAND)
+    legend["band: step of the grid"] = Patch(facecolor="black", alpha=OPACITY)
     _add_legend(figure, _names(compared), legend)
     robots = list(dict.fromkeys(robot_name(one.result) for one in compared))
     figure.suptitle("\n".join([f"{', '.join(robots)}: workspaces", ", ".join(fixed)]).strip())
@@ -133,7 +133,7 @@ def _points(one: Compared, axis: str) -> np.ndarray:
     # Return the drawn points of an axis out of the plane.
     if axis in one.across:
         return np.unique(one.result.axes[axis])
-    return np.array([one.place[axis]]) if axis in one.place else np.empty(0)
+    return np.array([one.coordinates[axis]]) if axis in one.coordinates else np.empty(0)
 
 
 def _agree(points: np.ndarray, others: np.ndarray) -> bool:
@@ -145,12 +145,12 @@ def _box(compared: list[Compared], plane: list[str]) -> np.ndarray:
     grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in compared for f in (np.min, np.max)])
     base = np.array(robot_of(compared[0].result).base_points)
     both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
-    shown = both if (np.ptp(both, axis=0) <= STRETCH * np.ptp(grids, axis=0)).all() else grids
-    room = MARGIN * np.ptp(shown, axis=0).max()
-    return np.stack([shown.min(0) - room, shown.max(0) + room])
+    shown = both if (np.ptp(both, axis=0) <= LARGEST_RATIO * np.ptp(grids, axis=0)).all() else grids
+    margin = MARGIN * np.ptp(shown, axis=0).max()
+    return np.stack([shown.min(0) - margin, shown.max(0) + margin])
 
 
-def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
+def _figure_size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
     columns = columns_of(count)
     width, height = (ALONE if count == 1 else SIDE) * np.clip((box[1] - box[0]) / (box[1] - box[0]).max(), 0.3, 1.0)
     return columns * (float(width) + 0.15) + 0.9, -(-count // columns) * (float(height) + 0.35) + 1.2 + 0.21 * lines
@@ -159,30 +159,30 @@ def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
 def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist]:
     # The line is thin along the end of the grid, beyond which nothing is known.
     # Margins of different conditions have different scales, so that zeros between their values would not compare: the
-    # line runs half-way between points on different sides, as volumes count them, in a band as wide as that step.
+    # line runs half-way between points on different sides, as volumes count them, in an area as wide as that step.
     plain, ends = sides._replace(margins=[]), False
-    _band(panel, plain, number)
+    _draw_step(panel, plain, number)
     for corners, is_end in outlines(plain):
         ends |= is_end
-        panel.plot(*corners.T, color=COLOURS[number], **(_END if is_end else _look(number)))
+        panel.plot(*corners.T, color=COLOURS[number], **(_END if is_end else _line_style(number)))
     return {"end of the grid": Line2D([], [], color="black", **_END)} if ends else {}
 
 
-def _band(panel: Axes, sides: BoundarySides, number: int) -> None:
+def _draw_step(panel: Axes, sides: BoundarySides, number: int) -> None:
     # Fill all triangles of the grid with corners on both sides: the boundary may lie in them.
     triangles = step_of(sides)
     path = Path2D(
         np.concatenate([triangles, triangles[:, :1]], axis=1).reshape(-1, 2),
         np.tile([Path2D.MOVETO, Path2D.LINETO, Path2D.LINETO, Path2D.CLOSEPOLY], len(triangles)),
     )
-    panel.add_patch(PathPatch(path, facecolor=COLOURS[number], alpha=BAND, linewidth=0.0))
+    panel.add_patch(PathPatch(path, facecolor=COLOURS[number], alpha=OPACITY, linewidth=0.0))
 
 
-def _look(number: int) -> dict[str, Any]:
+def _line_style(number: int) -> dict[str, Any]:
     return {"linestyle": STYLES[number], "linewidth": 1.6}
 
 
-def _add_legend(figure: Figure, words: list[str], marks: dict[str, Artist]) -> None:
-    lines = [Line2D([], [], color=COLOURS[i], **_look(i)) for i in range(len(words))]
-    labels = [*words, *marks]
-    figure.legend([*lines, *marks.values()], labels, loc="outside lower center", ncols=len(labels))
+def _add_legend(figure: Figure, words: list[str], entries: dict[str, Artist]) -> None:
+    lines = [Line2D([], [], color=COLOURS[i], **_line_style(i)) for i in range(len(words))]
+    labels = [*words, *entries]
+    figure.legend([*lines, *entries.values()], labels, loc="outside lower center", ncols=len(labels))

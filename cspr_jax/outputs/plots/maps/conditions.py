@@ -33,10 +33,10 @@ def said(result: Result) -> list[str]:
 
 def shown_first(result: Result) -> str:
     """The quantity of a map that a picture shows by default."""
-    known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
+    pictured = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
     if is_workspace(result) and len({MARGINS[name] for name in workspace_of(result).conditions}) > 1:
         return "verdict"
-    names = [*known, *result.data]
+    names = [*pictured, *result.data]
     # A margin that is not requested has no picture.
     return next((name for name in names if not np.isnan(result.data[name]).all()), names[0])
 
@@ -94,7 +94,7 @@ def _wrenches(workspace: WorkspaceTable) -> list[str]:
     for name, text in (("wrench_box", "box"), ("wrench_ellipsoid", "ellipsoid")):
         sizes = getattr(workspace, name)
         if sizes is not None:
-            words.append(f"{text} of wrenches ±({', '.join(f'{size:.4g}' for size in sizes)})")
+            words.append(f"{text} of wrenches ±({', '.join(f'{number:.4g}' for number in sizes)})")
     if workspace.acceleration is not None:
         words.append(f"accelerations up to {workspace.acceleration:.4g} m/s²")
     return words

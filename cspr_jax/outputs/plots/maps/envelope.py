@@ -1,4 +1,4 @@
-"""The orientations of one place in three dimensions: tilt around its azimuth, torsion upward."""
+"""The orientations of one position in three dimensions: tilt around its azimuth, torsion upward."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ def envelope_figure(
         raise InputError("--envelope", "nothing is accessible", "a place with accessible orientations")
     shown = levels[chosen(len(levels), SECTIONS)]
     figure = Figure(figsize=(10.5, 4.8), layout="constrained")
-    reach = np.degrees(tilt[accessible.any((0, 1))].max()) + 10.0
-    for place, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
-        panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1], computed_zorder=False)
+    radius = np.degrees(tilt[accessible.any((0, 1))].max()) + 10.0
+    for number, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
+        panel = figure.add_subplot(1, 2, number, projection="3d", elev=view[0], azim=view[1], computed_zorder=False)
         panel.set_box_aspect((4.0, 4.0, 3.0), zoom=1.12)
-        for orientations, look in ((accessible, _ACCESSIBLE), (attained, _ATTAINED)):
+        for orientations, style in ((accessible, _ACCESSIBLE), (attained, _ATTAINED)):
             for level in shown:
-                _outline(panel, azimuth, tilt, orientations[level], float(np.degrees(torsion[level])), look)
+                _outline(panel, azimuth, tilt, orientations[level], float(np.degrees(torsion[level])), style)
         panel.set(
-            xlim=(-reach, reach),
-            ylim=(-reach, reach),
+            xlim=(-radius, radius),
+            ylim=(-radius, radius),
             zlim=(np.degrees(torsion[levels[0]]), np.degrees(torsion[levels[-1]])),
             xlabel="tilt · cos azimuth (°)",
             ylabel="tilt · sin azimuth (°)",
@@ -64,7 +64,7 @@ def envelope_figure(
 
 
 def _outline(
-    panel, azimuth: np.ndarray, tilt: np.ndarray, inside: np.ndarray, height: float, look: tuple[str, float]
+    panel, azimuth: np.ndarray, tilt: np.ndarray, inside: np.ndarray, height: float, style: tuple[str, float]
 ) -> None:
     # Outline (n_azimuths, n_tilts) cells. The first azimuth comes again, and one tilt beyond, so that the line closes.
     around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
@@ -73,4 +73,4 @@ def _outline(
     closed = np.pad(inside.astype(float), ((0, 1), (0, 1)))
     closed[-1] = closed[0]
     if closed.any():
-        panel.contour(x, y, closed, levels=[0.5], colors=[look[0]], linewidths=look[1], zdir="z", offset=height)
+        panel.contour(x, y, closed, levels=[0.5], colors=[style[0]], linewidths=style[1], zdir="z", offset=height)

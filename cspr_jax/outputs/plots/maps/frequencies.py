@@ -22,7 +22,7 @@ AT_A_FREQUENCY = ("verdict", "margin", "used_frequency", "binding_cable", "durat
 HIGHEST = 2.5
 # Points along the band.
 FINE, HIGHEST_SHOWN = 1001, 1e6
-BAND, EDGE = "#cfe3f1", COLOURS[0]
+BAND_COLOUR, EDGE = "#cfe3f1", COLOURS[0]
 NATURAL: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.1}
 BEST: dict[str, Any] = {"color": COLOURS[1], "linewidth": 2.4}
 STATIC: dict[str, Any] = {"color": "0.35", "linestyle": ":", "linewidth": 1.2}
@@ -51,8 +51,8 @@ def frequencies_figure(result: Result, across: str, data: dict[str, np.ndarray],
         broken = (verdict != 0) & (used > low) & (used < high)
         if broken.any():
             panel.plot(points[broken], used[broken], label="refused by limits", **CROSSES)
-    for i, place in enumerate(limits):
-        panel.axvline(place, label="_" if i else "static limit", **STATIC)
+    for i, limit in enumerate(limits):
+        panel.axvline(limit, label="_" if i else "static limit", **STATIC)
     panel.set(xlim=(points[0], points[-1]), ylim=(0.0, top), ylabel="frequency (rad/s)")
     panel.set_xlabel(axis_label(result, across))
     if is_angle(result, across):
@@ -69,12 +69,12 @@ def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.nd
     order = np.argsort(result.axes[across], kind="stable")
     points = as_drawn(result, across, result.axes[across][order])
     ranges = panel.get_xlim(), panel.get_ylim()
-    for name, look in (("lowest_frequency", "-"), ("highest_frequency", "-"), ("natural_frequency", "--")):
+    for name, style in (("lowest_frequency", "-"), ("highest_frequency", "-"), ("natural_frequency", "--")):
         values = np.minimum(data[name][order], HIGHEST_SHOWN)
         for colour, width in (("white", 3.2), ("black", 1.2)):
-            panel.plot(points, values, color=colour, linewidth=width, linestyle=look if width < 2.0 else "-")
+            panel.plot(points, values, color=colour, linewidth=width, linestyle=style if width < 2.0 else "-")
     panel.set(xlim=ranges[0], ylim=ranges[1])
-    handles = [Line2D([], [], color="black", linewidth=1.2, linestyle=look) for look in ("-", "--")]
+    handles = [Line2D([], [], color="black", linewidth=1.2, linestyle=style) for style in ("-", "--")]
     words = ["ends of the feasible frequencies", "natural frequency"]
     figure.legend(handles, words, loc="outside lower center", ncols=2)
 
@@ -110,7 +110,7 @@ def _top(high: np.ndarray, natural: np.ndarray) -> float:
 def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> list[float]:
     # The lowest frequency leaves 0 between two points. Beyond the limit its square rises like a straight line; over
     # sizes, like one over their inverses.
-    places = []
+    limits = []
     with np.errstate(divide="ignore"):
         along = 1.0 / points if is_size else points
     for i in np.flatnonzero((low[:-1] == 0.0) != (low[1:] == 0.0)).tolist():
@@ -119,28 +119,28 @@ def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> lis
         ahead = first + step
         if np.isnan(low[first]):
             continue
-        place = float(points[inside])
+        limit = float(points[inside])
         if 0 <= ahead < len(low) and low[ahead] > low[first]:
-            slope = (low[ahead] ** 2 - low[first] ** 2) / (along[ahead] - along[first])
-            zero = along[first] - low[first] ** 2 / slope
-            place = 1.0 / zero if is_size else zero
+            gradient = (low[ahead] ** 2 - low[first] ** 2) / (along[ahead] - along[first])
+            zero = along[first] - low[first] ** 2 / gradient
+            limit = 1.0 / zero if is_size else zero
         ends = points[inside], points[first]
-        places.append(float(np.clip(place, min(ends), max(ends))))
-    return places
+        limits.append(float(np.clip(limit, min(ends), max(ends))))
+    return limits
 
 
 def _draw_band(panel: Axes, points: np.ndarray, low: np.ndarray, high: np.ndarray, limits: list[float]) -> None:
     # The lower end rises from each static limit as a root does, the upper one falls from infinity as an inverse root.
-    places = np.unique(np.concatenate([np.linspace(points[0], points[-1], FINE), points, limits]))
-    squares = np.interp(places, *_joined(points, low**2, limits)), np.interp(places, points, high**-2.0)
+    positions = np.unique(np.concatenate([np.linspace(points[0], points[-1], FINE), points, limits]))
+    squares = np.interp(positions, *_joined(points, low**2, limits)), np.interp(positions, points, high**-2.0)
     below, above = np.sqrt(squares[0]), np.maximum(squares[1], HIGHEST_SHOWN**-2.0) ** -0.5
-    panel.fill_between(places, below, above, color=BAND, linewidth=0.0, label="feasible")
+    panel.fill_between(positions, below, above, color=BAND_COLOUR, linewidth=0.0, label="feasible")
     for ends in (below, above):
-        panel.plot(places, ends, color=EDGE, linewidth=1.3)
+        panel.plot(positions, ends, color=EDGE, linewidth=1.3)
 
 
 def _joined(points: np.ndarray, values: np.ndarray, zeros: list[float]) -> tuple[np.ndarray, np.ndarray]:
     # Points of a line, with zeros of it that lie between them.
-    places = np.concatenate([points, zeros])
-    order = np.argsort(places, kind="stable")
-    return places[order], np.concatenate([values, np.zeros(len(zeros))])[order]
+    positions = np.concatenate([points, zeros])
+    order = np.argsort(positions, kind="stable")
+    return positions[order], np.concatenate([values, np.zeros(len(zeros))])[order]

@@ -21,13 +21,13 @@ _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyl
 
 
 class _Section(NamedTuple):
-    # A section, for its marks: its space, its axes, their names without "from_", where it is, the spools.
+    # A section, for its marks: its space, its axes, their names without "from_", its coordinates, the spools.
     panel: Axes | None
     result: Result
     space: tuple[str, ...]
     across: list[str]
     names: list[str]
-    place: dict[str, float]
+    coordinates: dict[str, float]
     base: np.ndarray
 
     @property
@@ -36,13 +36,15 @@ class _Section(NamedTuple):
         return self.base.mean(axis=0)
 
 
-def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
+def draw_marks(
+    panel: Axes, result: Result, name: str, across: list[str], coordinates: dict[str, float]
+) -> dict[str, Artist]:
     """Draw spools, P0 and the fixed end of the motions, as far as they belong into a section and fit into its range.
 
     P0 and that end are marked only where the section contains them, to half a step of the grid. The spools are
     projected onto it.
     """
-    section = _section(panel, result, across, place)
+    section = _section(panel, result, across, coordinates)
     if section is None:
         return {}
     limits = panel.get_xlim(), panel.get_ylim()
@@ -52,15 +54,15 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
             at = _drawn(section, point[None])
             if _inside(limits, at).any():
                 # Both are seen where they fall together: the plus lies within the circle.
-                symbol, size, layer = ("P", 6.0, 2.6) if words == "P0" else ("o", 9.0, 2.5)
-                artists[words] = panel.plot(*at[0], symbol, markersize=size, zorder=layer, **_EDGE)[0]
+                symbol, marker_size, layer = ("P", 6.0, 2.6) if words == "P0" else ("o", 9.0, 2.5)
+                artists[words] = panel.plot(*at[0], symbol, markersize=marker_size, zorder=layer, **_EDGE)[0]
     panel.set(xlim=limits[0], ylim=limits[1])
     return artists
 
 
-def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
+def marked(result: Result, name: str, across: list[str], over: str, coordinates: dict[str, float]) -> list[int]:
     """Find the sections, among many parallel ones, that contain P0 or the fixed end of the motions."""
-    section = _section(None, result, across, place)
+    section = _section(None, result, across, coordinates)
     if section is None or over not in section.space:
         return []
     points = result.axes[over]
@@ -68,23 +70,23 @@ def marked(result: Result, name: str, across: list[str], over: str, place: dict[
     for point in _points(section, name).values():
         gaps = points - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
         nearest = int(np.argmin(np.abs(gaps)))
-        if _contains(section._replace(place=section.place | {over: float(points[nearest])}), point):
+        if _contains(section._replace(coordinates=section.coordinates | {over: float(points[nearest])}), point):
             indices.append(nearest)
     return sorted(set(indices))
 
 
-def _section(panel: Axes | None, result: Result, across: list[str], place: dict[str, float]) -> _Section | None:
+def _section(panel: Axes | None, result: Result, across: list[str], coordinates: dict[str, float]) -> _Section | None:
     # Return None where nothing of this space can be marked.
     space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
     base = np.asarray(result.attributes.get("base_points", 0.0), float)
     if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
         return None
-    return _Section(panel, result, space, across, [axis.removeprefix("from_") for axis in across], place, base)
+    return _Section(panel, result, space, across, [axis.removeprefix("from_") for axis in across], coordinates, base)
 
 
 def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
     # Return P0, and the end that all motions share, by their words.
-    words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.place)
+    words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.coordinates)
     points = {"P0": _rest_point(section, name)}
     if all(axis in end for axis in "xyz"):
         points[words] = np.array([end[axis] for axis in "xyz"], float)
@@ -93,16 +95,16 @@ def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
 
 def _rest_point(section: _Section, name: str) -> np.ndarray | None:
     # P0 lies below the centroid of the spools; None where it is not one point.
-    place, result = section.place, section.result
-    frame, depth = frame_of(section.base, str(result.attributes.get("z_axis", "down"))), place.get("z0")
+    coordinates, result = section.coordinates, section.result
+    frame, depth = frame_of(section.base, str(result.attributes.get("z_axis", "down"))), coordinates.get("z0")
     if "z0" in result.choices or "inclination" in result.choices:
         return None
-    if depth is None and "z" in place and starts_at_rest(result, name):
+    if depth is None and "z" in coordinates and starts_at_rest(result, name):
         # z0 is chosen for each target: its own depth, or by the inclination.
         setting = table(result.settings, "trajectory").get("inclination")
-        inclination = place.get("inclination", 0.0 if setting is None else setting)
+        inclination = coordinates.get("inclination", 0.0 if setting is None else setting)
         if isinstance(inclination, float) and inclination > -1.0:
-            depth = float(frame.depth(place["z"])) / (1.0 + inclination)
+            depth = float(frame.depth(coordinates["z"])) / (1.0 + inclination)
     return None if depth is None else frame.outward(np.array([0.0, 0.0, depth]))
 
 
@@ -120,7 +122,7 @@ def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
     # Return (n, 2) of (n, 3), in the units of the picture; an azimuth lies within the revolution that the axis shows.
     columns = []
     for axis, name in zip(section.across, section.names, strict=True):
-        column = _coordinate(name, points, section.centre, section.place.get("azimuth"))
+        column = _coordinate(name, points, section.centre, section.coordinates.get("azimuth"))
         if name == "azimuth" and isinstance(section.panel, PolarAxes):
             columns.append(column % (2.0 * np.pi))
             continue
@@ -135,9 +137,9 @@ def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
 def _contains(section: _Section, point: np.ndarray) -> bool:
     for axis in section.space:
         name = axis.removeprefix("from_")
-        if axis not in section.place:
+        if axis not in section.coordinates:
             continue
-        current = section.place[axis]
+        current = section.coordinates[axis]
         points = section.result.axes.get(axis, np.array([current]))
         gaps = points - _coordinate(name, point[None], section.centre, None)[0]
         if name == "azimuth":
@@ -160,7 +162,7 @@ def _spools(section: _Section) -> dict[str, Artist]:
     if panel is None:
         return {}
     polar = isinstance(panel, PolarAxes)
-    if "radius" in names and "azimuth" not in (*section.place, *names):
+    if "radius" in names and "azimuth" not in (*section.coordinates, *names):
         return {}
     # Two cables may share a spool; the order is the cables'.
     flat = base[:, :2] if polar else _drawn(section, base)
@@ -170,22 +172,27 @@ def _spools(section: _Section) -> dict[str, Artist]:
     limits = panel.get_xlim(), panel.get_ylim()
     outline = len(points) > 1 and (polar or "azimuth" not in names) and not _crosses(flat)
     symbol = "" if outline and (polar or set(names) == {"x", "y"}) and len(points) > 2 else "s"
-    look: dict[str, Any] = {"marker": symbol, "markersize": 4.5, "markeredgecolor": "white", "markerfacecolor": "black"}
+    style: dict[str, Any] = {
+        "marker": symbol,
+        "markersize": 4.5,
+        "markeredgecolor": "white",
+        "markerfacecolor": "black",
+    }
     if outline:
         ring = np.concatenate([points, points[:1]])
         panel.plot(*ring.T, color="white", linewidth=2.4)
     else:
         ring = points
-    panel.plot(*ring.T, color="black", linewidth=1.0 if outline else 0.0, **look)
+    panel.plot(*ring.T, color="black", linewidth=1.0 if outline else 0.0, **style)
     (left, right), (bottom, top) = map(sorted, limits)
     through = outline and not polar and Path(ring).intersects_bbox(Bbox([[left, bottom], [right, top]]), filled=False)
     if not through and not _inside(limits, points).any():
         return {}
     if symbol:
-        return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **look)}
+        return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **style)}
     # The legend shows the same shape.
-    middle, size = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
-    shape = Path(np.concatenate([flat, flat[:1]]) / size - middle / size, closed=True)
+    middle, extent = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
+    shape = Path(np.concatenate([flat, flat[:1]]) / extent - middle / extent, closed=True)
     return {"spools": Line2D([], [], marker=shape, markersize=13, markerfacecolor="none", color="black", linestyle="")}
 
 

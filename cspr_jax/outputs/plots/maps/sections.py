@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.outputs.plots.maps.conditions import EXCLUDED
-from cspr_jax.outputs.plots.maps.marks import mark, marked
-from cspr_jax.outputs.plots.maps.steps import edges, number_scale
+from cspr_jax.outputs.plots.maps.marks import draw_marks, marked
 from cspr_jax.outputs.plots.robots.obstacles import draw_obstacles
-from cspr_jax.outputs.plots.style.colours import LARGEST, NONE_COLOUR, Scale, add_bar
+from cspr_jax.outputs.plots.style.colours import LARGEST, NONE_COLOUR, TOLD_APART, Scale, add_bar, scale_of
 from cspr_jax.outputs.plots.style.labels import (
     PANELS,
     as_drawn,
@@ -28,19 +30,23 @@ from cspr_jax.outputs.plots.style.labels import (
     unit,
     values,
 )
-from cspr_jax.outputs.plots.style.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
+from cspr_jax.outputs.plots.style.layout import columns_of, in_degrees, in_whole_numbers, panels, set_polar_ticks
 from cspr_jax.outputs.plots.style.word_ticks import word_scale, worded
-from cspr_jax.schema.quantities import EVERY
+from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Int
+    from jaxtyping import Float, Int
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
 # A top view: straight from above, in true shape.
 AROUND = ("azimuth", "radius")
+# Pairs of axes that make a plane, the second upward or, in polar coordinates, outward. A picture shows the first pair
+# that varies, or else the pair with the most cells.
+PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
+OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 HATCH = "////"
 PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
@@ -52,7 +58,7 @@ class PlaneSection(NamedTuple):
         name: of the quantity.
         across: the two axes of a panel.
         over: the axis that differs between the panels; None: there is one panel.
-        place: axes fixed for the picture, and where.
+        coordinates: of axes fixed for the picture.
         fixed: words for the constants.
         excluded: (n_first, n_second, n_panels) cells that are excluded by other conditions than that of the
             quantity.
@@ -61,7 +67,7 @@ class PlaneSection(NamedTuple):
     name: str
     across: list[str]
     over: str | None
-    place: dict[str, float]
+    coordinates: dict[str, float]
     fixed: list[str]
     excluded: np.ndarray
 
@@ -78,10 +84,10 @@ def section_figure(
     says = np.ones(data.shape, bool) if informative is None else informative
     saying = np.flatnonzero(says.any((0, 1)))
     shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
-    alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.place
+    alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.coordinates
     if over is not None:
         shown = _moved(shown, marked(result, name, across, over, alone))
-    figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
+    figure = Figure(figsize=_figure_size(result, across, len(shown)), layout="constrained")
     axes, bottom, left = panels(figure, len(shown), polar=polar)
     # The points of an axis may come in any order, and twice.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
@@ -109,15 +115,15 @@ def section_figure(
         _hatch(panel, excluded[:, :, k], points)
         if quantity.contoured and not polar:
             _loci(panel, cells[:, :, k], points)
-        place = alone | ({over: float(result.axes[over][shown[k]])} if over is not None else {})
-        elsewhere = {a: p for a, p in place.items() if a not in across}
-        legend |= draw_obstacles(panel, result, across, elsewhere) | mark(panel, result, name, across, elsewhere)
+        coordinates = alone | ({over: float(result.axes[over][shown[k]])} if over is not None else {})
+        elsewhere = {a: p for a, p in coordinates.items() if a not in across}
+        legend |= draw_obstacles(panel, result, across, elsewhere) | draw_marks(panel, result, name, across, elsewhere)
         if titles:
             panel.set_title(titles[k])
     words = list(section.fixed)
     if polar:
         outward = np.flatnonzero(says[:, orders[1]][:, :, shown].any((0, 2)))
-        reach_polar(axes, edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
+        set_polar_ticks(axes, edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
@@ -139,7 +145,7 @@ def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
     return np.sort(indices)
 
 
-def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
+def _figure_size(result: Result, across: list[str], count: int) -> tuple[float, float]:
     # Return inches. Panels in metres have the shape of their range.
     columns = columns_of(count)
     side = SINGLE if count == 1 else PANEL
@@ -212,3 +218,36 @@ def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
     lines = panel.contour(*points, cells.T, levels=levels, colors="white", linewidths=0.8)
     for text in panel.clabel(lines, fmt="%d", fontsize="small"):
         text.set_rotation(0.0)  # turned, a 6 could be a 9
+
+
+def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
+    """The scale of a quantity whose numbers are no words."""
+    choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
+    points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))
+    if not 0 < len(points) <= TOLD_APART:
+        return scale_of(values, signed=EVERY[name].signed)
+    shades = matplotlib.colormaps["cividis"](np.linspace(0.0, 1.0, len(points)))
+    return Scale(
+        ListedColormap(list(shades)).with_extremes(bad=NONE_COLOUR),
+        BoundaryNorm(edges(points), len(points)),
+        ticks=(points.tolist(), [f"{point:.4g}" for point in points]),
+        missing=bool(np.isnan(values).any()),
+    )
+
+
+def edges(points: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n+1"]:
+    """Edges of cells about points."""
+    if len(points) == 1:
+        return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
+    middles = 0.5 * (points[1:] + points[:-1])
+    return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])
+
+
+def in_order(result: Result, across: Sequence[str]) -> list[str]:
+    """Axes that vary, those of the plane first."""
+    plane = next((pair for pair in PLANES if set(pair) <= set(across)), None) or max(
+        (pair for pair in OTHERS if set(pair) <= set(across)),
+        key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),
+        default=(),
+    )
+    return [*plane, *(axis for axis in across if axis not in plane)]

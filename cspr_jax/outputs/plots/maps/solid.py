@@ -62,10 +62,10 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     if not (sides.verdict == 0).any():
         raise InputError("--solid", "nothing is inside", "a workspace with poses inside")
     surface = boundary(sides)
-    angles = {axis: float(result.axes[axis][place]) for axis, place in index.items()}
+    angles = {axis: float(result.axes[axis][i]) for axis, i in index.items()}
     robot = posed(result, middle_of(sides), angles)
     bodies = obstacles(result)
-    points = np.concatenate([surface.corners, robot.ways.reshape(-1, 3), *bodies])
+    points = np.concatenate([surface.corners, robot.cable_points.reshape(-1, 3), *bodies])
     is_down = result.attributes.get("z_axis", "down") == "down"
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
@@ -162,12 +162,12 @@ def _draw_robot(panel: Axes3D, robot: Posed) -> None:
     panel.add_collection3d(
         Line3DCollection(np.stack([robot.base, down], 1), colors="#9a9a9a", linewidths=0.6, linestyles=":", zorder=0.5)
     )
-    panel.add_collection3d(Line3DCollection(robot.ways, colors=CABLES, linewidths=1.1, zorder=2.0))
+    panel.add_collection3d(Line3DCollection(robot.cable_points, colors=CABLES, linewidths=1.1, zorder=2.0))
     if len(robot.faces):
         panel.add_collection3d(Poly3DCollection(robot.faces, facecolors="#505050", edgecolors="none", zorder=2.1))
     panel.add_collection3d(Line3DCollection(robot.edges, colors="black", linewidths=1.2, zorder=2.2))
-    for points, look in ((robot.base, "s"), (robot.attached, "o")):
-        panel.plot(*points.T, look, color="black", markersize=4.0 if look == "s" else 2.0, zorder=2.3)
+    for points, symbol in ((robot.base, "s"), (robot.attached, "o")):
+        panel.plot(*points.T, symbol, color="black", markersize=4.0 if symbol == "s" else 2.0, zorder=2.3)
     # A flat box is larger than its panel, which is a square.
     for artist in (*panel.collections, *panel.lines):
         artist.set(clip_on=False, in_layout=False)
@@ -201,9 +201,9 @@ def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any
 def volume_words(result: Result, index: dict[str, int]) -> str:
     """The volume of a workspace with its error, in words."""
     volume: WorkspaceVolume = volume_of(result)
-    place = tuple(index[axis] for axis in volume.axes)
-    size, error = float(volume.volume[place]), float(volume.error[place])
+    index_of_volume = tuple(index[axis] for axis in volume.axes)
+    value, error = float(volume.volume[index_of_volume]), float(volume.error[index_of_volume])
     if error == 0.0:
-        return f"volume {size:.4g} m³"
+        return f"volume {value:.4g} m³"
     digits = max(0, 1 - int(np.floor(np.log10(error))))  # two of the error
-    return f"volume {size:.{digits}f} ± {error:.{digits}f} m³"
+    return f"volume {value:.{digits}f} ± {error:.{digits}f} m³"

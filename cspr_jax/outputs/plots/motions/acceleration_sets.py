@@ -4,8 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from cspr_jax.build.limits import build_limits
-from cspr_jax.build.robots import gravity_of, kernel_robot
+from cspr_jax.build.robots import build_limits, gravity_of, kernel_robot
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.numerics.linear.frames import frame_of
@@ -16,7 +15,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
 from cspr_jax.store.reading.result import Result
-from cspr_jax.workspaces.acceleration_search import faces_of, judged
+from cspr_jax.workspaces.acceleration_search import faces_of, margins_and_verdicts
 
 # Rows that are computed together: with many cables the faces of all rows would not fit into memory.
 ROWS = 1 << 14
@@ -35,7 +34,7 @@ class AccelerationSet:
         offsets: (n_faces,) m/s^2; -inf of a face that bounds nothing.
         names: of the faces.
         cables: (n_cables, 3) unit vectors from the effector to the spools.
-        reach: (n_cables,) acceleration from the smallest to the largest tension, m/s^2.
+        span: (n_cables,) acceleration from the smallest to the largest tension, m/s^2.
         apex: (3,) acceleration that the smallest tensions give, m/s^2.
         falling: (3,) acceleration of free fall, m/s^2.
         motion: (n, 3) accelerations of the whole motion, m/s^2.
@@ -50,7 +49,7 @@ class AccelerationSet:
     offsets: np.ndarray
     names: list[str]
     cables: np.ndarray
-    reach: np.ndarray
+    span: np.ndarray
     apex: np.ndarray
     falling: np.ndarray
     motion: np.ndarray
@@ -74,43 +73,45 @@ class AccelerationSet:
 
 def acceleration_set(result: Result, file: str, at: dict[str, float]) -> AccelerationSet:
     """Feasible accelerations at an instant of a motion."""
-    robot_file, keys = robot_and_plan(result, file, "acceleration")
+    robot_file, plan_file = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
         error = f'"acceleration" of {robot_file.kind}'
-        raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=error)
-    place, words = None, ""
-    for axis, instant in at.items():
-        place, words = nearest(result, axis, instant)  # it refuses all but t
+        raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", problem=error)
+    row, words = None, ""
+    for axis, time in at.items():
+        row, words = nearest(result, axis, time)  # it refuses all but t
     with double_precision():
         robot, frame = (
-            kernel_robot(robot_file, keys, file, any_cables=True),
+            kernel_robot(robot_file, plan_file, file, any_cables=True),
             frame_of(robot_file.base_points, robot_file.z_axis),
         )
-        low, high = (as_float64(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
+        low, high = (
+            as_float64(tensions) for tensions in tension_range(robot, build_limits(robot_file, plan_file, file))
+        )
         limits = Limits(tension_min=low, tension_max=high)
         positions, motion = frame.inward(result.data["position"]), frame.rotated(result.data["acceleration"])
-        if place is None:
-            place = _tightest(robot, limits, positions, motion)
-            words = f"{value(result, 't', result.axes['t'][place])} (smallest margin)"
-        current = slice(place, place + 1)
+        if row is None:
+            row = _tightest(robot, limits, positions, motion)
+            words = f"{value(result, 't', result.axes['t'][row])} (smallest margin)"
+        current = slice(row, row + 1)
         faces = faces_of(robot, limits, positions[current])
-        margin = judged(robot, faces, faces, positions[current], motion[current])[0]
+        margin = margins_and_verdicts(robot, faces, faces, positions[current], motion[current])[0]
     if not np.asarray(faces.is_regular)[0]:
         raise InputError("--at", words, "an instant at which the cables span the space, or the plane of a planar robot")
     upward = np.array([*frame.signs[:2], -1.0])
-    rays = np.asarray(robot.base_points) - positions[place]
+    rays = np.asarray(robot.base_points) - positions[row]
     return AccelerationSet(
         words=words,
-        position=result.data["position"][place],
-        actual=motion[place] * upward,
+        position=result.data["position"][row],
+        actual=motion[row] * upward,
         margin=float(margin[0]),
         normals=np.asarray(faces.normals)[0] * upward,
         offsets=np.asarray(faces.offsets)[0],
         names=_names(robot_file.dof, len(rays), np.asarray(faces.of_largest)[0]),
         cables=rays / np.linalg.norm(rays, axis=1, keepdims=True) * upward,
-        reach=np.asarray(high - low) / robot_file.mass,
+        span=np.asarray(high - low) / robot_file.mass,
         apex=np.asarray(faces.apex)[0] * upward,
-        falling=np.array([0.0, 0.0, -gravity_of(robot_file, keys)]),
+        falling=np.array([0.0, 0.0, -gravity_of(robot_file, plan_file)]),
         motion=motion * upward,
         is_planar=robot_file.is_planar,
     )
@@ -122,7 +123,7 @@ def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, moti
     for first in range(0, len(positions), ROWS):
         current, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
         faces = faces_of(robot, limits, current)
-        margins.append(judged(robot, faces, faces, current, accelerations)[0])
+        margins.append(margins_and_verdicts(robot, faces, faces, current, accelerations)[0])
     return int(np.nanargmin(np.concatenate(margins)))
 
 

@@ -67,17 +67,17 @@ def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figu
     """The diagram."""
     region = acceleration_set(result, file, at)
     views = _views(region)
-    size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)
-    figure = Figure(figsize=size, layout="constrained")
+    figure_size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)
+    figure = Figure(figsize=figure_size, layout="constrained")
     legend: dict[str, Artist] = {}
     for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
         legend |= _draw(panel, region, view, 1.3 if len(views) == 1 else 1.0)
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4)
-    place = f"at ({', '.join(f'{number:.4g}' for number in region.position)}) m"
+    where = f"at ({', '.join(f'{number:.4g}' for number in region.position)}) m"
     margin = f"margin {region.margin:.3g} m/s² to the face of {region.names[region.nearest]}"
     axis = f"z axis {result.attributes.get('z_axis', 'down')}"
     title = f"{robot_name(result)}: feasible accelerations"
-    figure.suptitle(f"{title}\n{region.words}, {place}, {axis}\n{margin}{doubt(result)}")
+    figure.suptitle(f"{title}\n{region.words}, {where}, {axis}\n{margin}{doubt(result)}")
     return figure
 
 
@@ -89,9 +89,9 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
     across = _level(-region.normals[region.nearest], 1.0)
     along = _level(region.actual, -region.falling[2])
 
-    def vertical(title: str, way: np.ndarray, **others: bool) -> AccelerationView:
-        label = f"level acceleration, azimuth {np.degrees(np.arctan2(way[1], way[0])):.3g}° (m/s²)"
-        return AccelerationView(f"vertical, {title}", Plane(region.actual, way, UP), (label, upward), **others)
+    def vertical(title: str, direction: np.ndarray, **others: bool) -> AccelerationView:
+        label = f"level acceleration, azimuth {np.degrees(np.arctan2(direction[1], direction[0])):.3g}° (m/s²)"
+        return AccelerationView(f"vertical, {title}", Plane(region.actual, direction, UP), (label, upward), **others)
 
     labels = ("acceleration along x (m/s²)", "acceleration along y (m/s²)")
     height = f"{region.actual[2] if abs(region.actual[2]) > LEVEL * abs(region.falling[2]) else 0.0:.3g}"
@@ -100,8 +100,8 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
     )
     # An acceleration without a level part lies in every vertical section, and so does any in one of a level face.
     if along is None or across is None or abs(along @ across) > 1.0 - LEVEL:
-        way = next((way for way in (across, along) if way is not None), X)
-        return [level, vertical("across the nearest face", way, holds_rest=True, across_face=True)]
+        direction = next((direction for direction in (across, along) if direction is not None), X)
+        return [level, vertical("across the nearest face", direction, holds_rest=True, across_face=True)]
     return [
         level,
         vertical("along the acceleration", along, holds_rest=True),
@@ -109,10 +109,10 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
     ]
 
 
-def _level(vector: np.ndarray, size: float) -> np.ndarray | None:
+def _level(vector: np.ndarray, scale: float) -> np.ndarray | None:
     # Return the direction of the level part of a vector; None where that part is negligible beside a size.
     part = np.hypot(*vector[:2])
-    return np.array([*vector[:2], 0.0]) / part if part > LEVEL * size else None
+    return np.array([*vector[:2], 0.0]) / part if part > LEVEL * scale else None
 
 
 def _draw(panel: Axes, region: AccelerationSet, view: AccelerationView, shape: float) -> dict[str, Artist]:
@@ -170,11 +170,11 @@ def _shows_motion(view: AccelerationView) -> bool:
 
 def _directions(panel: Axes, region: AccelerationSet, view: AccelerationView, window: Window) -> Artist:
     # Draw the directions of the cables of a planar robot.
-    size = 0.28 * (window.high - window.low).min()
+    length = 0.28 * (window.high - window.low).min()
     start = view.plane.seen(region.apex)
-    for number, way in enumerate(view.plane.seen(region.cables), start=1):
-        _arrow(panel, start, start + size * way, _CABLE)
-        panel.annotate(str(number), start + 1.14 * size * way, **_NUMBER)
+    for number, direction in enumerate(view.plane.seen(region.cables), start=1):
+        _arrow(panel, start, start + length * direction, _CABLE)
+        panel.annotate(str(number), start + 1.14 * length * direction, **_NUMBER)
     return Line2D([], [], **_CABLE)
 
 
@@ -182,7 +182,7 @@ def _corners(panel: Axes, region: AccelerationSet, view: AccelerationView) -> Ar
     # Mark where each cable's direction meets a level section while the other cables have their smallest tensions.
     lengths = (region.actual[2] - region.apex[2]) / region.cables[:, 2]
     corners = view.plane.seen(region.apex + lengths[:, None] * region.cables)
-    there = (lengths >= 0.0) & (lengths <= region.reach)
+    there = (lengths >= 0.0) & (lengths <= region.span)
     middle = corners[there].mean(axis=0) if there.any() else np.zeros(2)
     for number in np.flatnonzero(there):
         panel.plot(*corners[number], **_CORNER, zorder=3.0)
@@ -192,6 +192,6 @@ def _corners(panel: Axes, region: AccelerationSet, view: AccelerationView) -> Ar
     return Line2D([], [], **_CORNER)
 
 
-def _arrow(panel: Axes, start: np.ndarray, end: np.ndarray, look: dict[str, Any]) -> None:
-    style = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 10.0} | look
+def _arrow(panel: Axes, start: np.ndarray, end: np.ndarray, style: dict[str, Any]) -> None:
+    style = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 10.0} | style
     panel.annotate("", tuple(end), tuple(start), arrowprops=style, zorder=3.0)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
 # More way-points than these would hide the path.
-MOST = 40
+LARGEST_COUNT = 40
 # Each mark lies within the one before it.
 _HOLLOW: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -33,13 +33,17 @@ def draw_ends(
     panel: Any, path: Float[np.ndarray, "n_rows 3"], rows: np.ndarray, axes: Sequence[int] = (0, 1, 2)
 ) -> None:
     """Mark where a motion starts, where its segments meet, and where it ends."""
-    places = {"start": rows[:1], "way-points": rows[1:-1] if len(rows) - 2 <= MOST else rows[:0], "end": rows[-1:]}
-    for name, look in LOOKS.items():
-        if len(places[name]):
-            panel.plot(*path[places[name]][:, axes].T, **look, clip_on=False, in_layout=False)
+    rows_by_name = {
+        "start": rows[:1],
+        "way-points": rows[1:-1] if len(rows) - 2 <= LARGEST_COUNT else rows[:0],
+        "end": rows[-1:],
+    }
+    for name, style in LOOKS.items():
+        if len(rows_by_name[name]):
+            panel.plot(*path[rows_by_name[name]][:, axes].T, **style, clip_on=False, in_layout=False)
 
 
 def entries_of_ends(rows: np.ndarray) -> dict[str, Artist]:
     """Entries of a legend for what `draw_ends` marks."""
-    shown = [name for name in LOOKS if name != "way-points" or 0 < len(rows) - 2 <= MOST]
+    shown = [name for name in LOOKS if name != "way-points" or 0 < len(rows) - 2 <= LARGEST_COUNT]
     return {name: Line2D([], [], **LOOKS[name]) for name in shown}

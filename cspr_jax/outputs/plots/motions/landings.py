@@ -18,18 +18,18 @@ def landing_figure(result: Result) -> Figure:
     figure = Figure(figsize=(6.4, 5.6), layout="constrained")
     panel = figure.subplots()
     landings = result.data["landing"]
-    known = landings[np.isfinite(landings).all(1)] * MILLIMETRES
-    panel.plot(*known[:SHOWN].T, linestyle="", marker=".", markersize=3, color=COLOURS[0], alpha=0.35, rasterized=True)
-    if len(known) > 1:
+    finite = landings[np.isfinite(landings).all(1)] * MILLIMETRES
+    panel.plot(*finite[:SHOWN].T, linestyle="", marker=".", markersize=3, color=COLOURS[0], alpha=0.35, rasterized=True)
+    if len(finite) > 1:
         for part, style in ((1.0, "-"), (2.0, "--")):
-            _ellipse(panel, known, part, style)
+            _ellipse(panel, finite, part, style)
     panel.plot(0.0, 0.0, linestyle="", marker="+", markersize=12, markeredgewidth=2.0, color="black", label="target")
     panel.set(xlabel="Δx (mm)", ylabel="Δy (mm)")
     panel.set_aspect("equal", adjustable="datalim")
     panel.grid(alpha=0.3)
     panel.legend(loc="upper right")
-    sizes = np.linalg.norm(known, axis=1)
-    missed = len(landings) - len(known)
+    sizes = np.linalg.norm(finite, axis=1)
+    missed = len(landings) - len(finite)
     words = f"{len(landings)} throws, distance from the target {sizes.mean():.2f} ± {sizes.std():.2f} mm"
     panel.set_title(words + (f"; {missed} never at its height" if missed else ""), fontsize="medium")
     figure.suptitle(f"{robot_name(result)}: where throws land")

@@ -1,7 +1,11 @@
 """A motion over time: its path and the tensions of the cables."""
 
+from __future__ import annotations
+
+import functools
+import operator
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,8 +13,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
-from cspr_jax.outputs.plots.motions.failing import failing_in
 from cspr_jax.outputs.plots.motions.motion_source import keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.robots.obstacles import draw_shadows
 from cspr_jax.outputs.plots.robots.robot_along import limits_of
@@ -18,11 +22,24 @@ from cspr_jax.outputs.plots.style.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
 from cspr_jax.schema.quantities import PARTS
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# By the quantity that a chart shows: the criteria that it shows. Those that no chart of a figure shows are in its chart
+# of the path, or of the tensions.
+SHOWN = {
+    "tension": Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE | Verdict.UNCERTAINTY,
+    "rate": Verdict.CABLE_TOO_FAST | Verdict.CABLE_OVER_ACCELERATION,
+    "length": Verdict.CABLE_TOO_LONG,
+    "velocity": Verdict.TOO_FAST | Verdict.OVER_FEED,
+    "acceleration": Verdict.OVER_ACCELERATION,
+}
 # In longer plans the lines would hide the rest.
 BOUNDARIES = 200
-# Share of the distance between spools that typed digits may leave between points of one plane.
+# Fraction of the distance between spools that typed digits may leave between points of one plane.
 ONE_PLANE = 1e-9
 # Limits beyond this many times the largest value are written and not drawn.
 FAR = 3.0
@@ -50,13 +67,13 @@ def motion_figure(result: Result) -> Figure:
         )
         if is_shown
     ]
-    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"], *([name] * 2 for name in more)]
+    layout: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"], *([name] * 2 for name in more)]
     heights = [1.2, 1.0, *[0.8] * len(more)]
     if "quaternion" in result.data:
-        places.insert(1, ["orientation", "orientation"])
+        layout.insert(1, ["orientation", "orientation"])
         heights.insert(1, 0.8)
     figure = Figure(figsize=(10.0, 2.8 * sum(heights)), layout="constrained")
-    drawn = figure.subplot_mosaic(places, height_ratios=heights)
+    drawn = figure.subplot_mosaic(layout, height_ratios=heights)
     if "quaternion" in result.data:
         _orientation(drawn["orientation"], time, result.data["quaternion"])
     for name, j in (("xy", 1), ("xz", 2)):
@@ -87,9 +104,9 @@ def motion_figure(result: Result) -> Figure:
     for name in charts:
         _mark_intervals(drawn[name], result, name, charts)
     _name_ends(figure, drawn["xz"], segment_rows(result.data, time))
-    place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
+    words = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
-    figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{point_words(result.data)}{doubt(result)}")
+    figure.suptitle(f"{robot_name(result)}: {words}z axis {axis}{point_words(result.data)}{doubt(result)}")
     return figure
 
 
@@ -127,16 +144,16 @@ def draw_limits(
 
 def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     tension = result.data["tension"]
-    robot_file, keys = robot_and_plan(result, "plan", "tension")
-    draw_limits(drawn["tension"], limits_of(robot_file, keys), tension, "N")
+    robot_file, plan_file = robot_and_plan(result, "plan", "tension")
+    draw_limits(drawn["tension"], limits_of(robot_file, plan_file), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:
         # The rule by which redundant cables share the load.
-        drawn["tension"].set_ylabel(f"tension (N)\n{keys.tension_rule}")
-    for _, level in limits_of(robot_file, keys, "depth"):
+        drawn["tension"].set_ylabel(f"tension (N)\n{plan_file.tension_rule}")
+    for _, level in limits_of(robot_file, plan_file, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
-    for name in [name for name in ("xy", "xz") if keys.obstacle and name in drawn]:
-        draw_shadows(drawn[name], keys.bodies, (0, "xyz".index(name[1])))
+    for name in [name for name in ("xy", "xz") if plan_file.obstacle and name in drawn]:
+        draw_shadows(drawn[name], plan_file.bodies, (0, "xyz".index(name[1])))
         legend_above(drawn[name], 3)
 
 
@@ -159,8 +176,8 @@ def shade_failing(panel: Axes, columns: Mapping[str, Any], chart: str, charts: S
     if len(intervals):
         # The areas reach from the bottom to the top of any panel; their edges show intervals without a length.
         areas = [[(start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0)] for start, end in intervals]
-        look: dict[str, Any] = {"transform": panel.get_xaxis_transform(), "zorder": 0.5, "label": FAILS}
-        panel.add_collection(PolyCollection(areas, **look, **FAILING), autolim=False)
+        style: dict[str, Any] = {"transform": panel.get_xaxis_transform(), "zorder": 0.5, "label": FAILS}
+        panel.add_collection(PolyCollection(areas, **style, **FAILING), autolim=False)
 
 
 def doubt(result: Result) -> str:
@@ -189,8 +206,8 @@ def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
     # Draw the flight of a released object.
     panel.plot(position[:, 0], position[:, j], color=COLOURS[1], linewidth=1.2, linestyle="--", label="flight")
     for row, marker, name in ((0, "o", "release"), (-1, "x", "landing")):
-        place = position[row, 0], position[row, j]
-        panel.plot(*place, linestyle="", marker=marker, markersize=6, color=COLOURS[1], label=name)
+        point = position[row, 0], position[row, j]
+        panel.plot(*point, linestyle="", marker=marker, markersize=6, color=COLOURS[1], label=name)
 
 
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
@@ -230,3 +247,15 @@ def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, names: list[st
             "right", functions=(lambda f: np.asarray(f) / mass, lambda a: np.asarray(a) * mass)
         )
         second.set_ylabel("tension per mass (N/kg)")
+
+
+def failing_in(columns: Mapping[str, Any], chart: str, charts: Sequence[str]) -> Float[np.ndarray, "m 2"]:
+    """Intervals in which criteria fail that one of several charts shows."""
+    if "criterion_failing" not in columns:
+        return np.reshape(columns.get("failing", ()), (-1, 2))
+    shown = SHOWN.get(chart, Verdict.FEASIBLE)
+    if chart == ("path" if "path" in charts else "tension"):
+        others = [SHOWN[name] for name in charts if name in SHOWN and name != chart]
+        shown = ~functools.reduce(operator.or_, others, Verdict.FEASIBLE)
+    chosen = (np.asarray(columns["criterion_flag"]) & shown.value) != 0
+    return united(np.asarray(columns["criterion_failing"])[chosen])

@@ -27,14 +27,14 @@ def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
     rows: list[Any] = [[*views] * (2 // len(views)), ["tension"] * 2, ["rate"] * 2]
     panels = figure.subplot_mosaic(rows, height_ratios=[1.6, 1, 1])
     for k, (result, name) in enumerate(zip(results, _names(results, files), strict=True)):
-        look: dict[str, Any] = {"color": COLOURS[k], "linestyle": STYLES[k], "linewidth": 1.4}
+        style: dict[str, Any] = {"color": COLOURS[k], "linestyle": STYLES[k], "linewidth": 1.4}
         time, position = result.axes["t"], result.data["position"]
         for panel, j in views.items():
-            panels[panel].plot(position[:, 0], position[:, j], **look)
-        panels["tension"].plot(time, result.data["tension"].min(1), label=name, **look)
-        panels["rate"].plot(time, np.abs(result.data["rate"]).max(1), **look)
+            panels[panel].plot(position[:, 0], position[:, j], **style)
+        panels["tension"].plot(time, result.data["tension"].min(1), label=name, **style)
+        panels["rate"].plot(time, np.abs(result.data["rate"]).max(1), **style)
     for panel, j in views.items():
-        _place(panels[panel], results, j)
+        _draw_spools(panels[panel], results, j)
     if axes[0] == "down":
         panels["xz"].invert_yaxis()
     panels["tension"].axhline(0.0, color="black", linewidth=0.8)
@@ -49,7 +49,7 @@ def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
     return figure
 
 
-def _place(panel: Axes, results: list[Result], j: int) -> None:
+def _draw_spools(panel: Axes, results: list[Result], j: int) -> None:
     # Spools are those of the first robot only where all have them.
     bases = [np.asarray(result.attributes.get("base_points", np.empty((0, 3)))) for result in results]
     if all(base.shape == bases[0].shape and (base == bases[0]).all() for base in bases):

@@ -32,12 +32,12 @@ class MotionPicture(NamedTuple):
 
     Fields:
         draw: makes it from the motion, the name of its file, and the instant.
-        needs: quantity that the file must have; empty for none.
+        needed_quantity: quantity that the file must have; empty for none.
         at_instant: whether it shows one instant, "t".
     """
 
     draw: Callable[[Result, str, dict[str, float]], Figure]
-    needs: str = ""
+    needed_quantity: str = ""
     at_instant: bool = False
 
 
@@ -54,20 +54,24 @@ MOTION_PICTURES = {
     TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
     SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
     ACCELERATION: MotionPicture(_acceleration, at_instant=True),
-    PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
-    PHASE_PLANE: MotionPicture(lambda result, *_: phase_plane_figure(result), needs="path_speed"),
-    LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),
+    PATH_ACCELERATION: MotionPicture(
+        lambda result, file, _: path_figure(result, file), needed_quantity=PATH_ACCELERATION
+    ),
+    PHASE_PLANE: MotionPicture(lambda result, *_: phase_plane_figure(result), needed_quantity="path_speed"),
+    LANDING: MotionPicture(lambda result, *_: landing_figure(result), needed_quantity=LANDING),
 }
 
 
 def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
     """The requested picture of a motion."""
-    instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
-    if at and quantity not in instants:
-        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(instants)}")
+    at_instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
+    if at and quantity not in at_instants:
+        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(at_instants)}")
     if quantity is None:
         return motion_figure(result)
-    known = [name for name, row in MOTION_PICTURES.items() if not row.needs or row.needs in result.data]
-    if quantity not in known:
-        raise InputError("--quantity", quantity, f"{one_of(quantity, known)} for this motion, or absent")
+    possible = [
+        name for name, row in MOTION_PICTURES.items() if not row.needed_quantity or row.needed_quantity in result.data
+    ]
+    if quantity not in possible:
+        raise InputError("--quantity", quantity, f"{one_of(quantity, possible)} for this motion, or absent")
     return MOTION_PICTURES[quantity].draw(result, file, at)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.equivalents import as_moved
-from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.table import Z_AXES
-from cspr_jax.config.plan import PlanFile, kept_plan, plan_keys, read_plan
-from cspr_jax.config.reading import checked, read_text
+from cspr_jax.config.plan import PlanFile, checked_plan, plan_of_text, read_plan
+from cspr_jax.config.reading import checked, json_text, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -49,21 +48,23 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     """A motion without robot and plan, with those of a plan file."""
     _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
-    keys = read_plan(text, path)
-    robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
-    others = {"family": keys.family} | ({"z0": keys.z0} if isinstance(keys.z0, float) else {})
+    plan_file = read_plan(text, path)
+    robot_file = as_moved(
+        resolve_robot(plan_file.robot, path, path.parent), [FAMILIES[name].legs for name in plan_file.families]
+    )
+    others = {"family": plan_file.family} | ({"z0": plan_file.z0} if isinstance(plan_file.z0, float) else {})
     return _with_robot_file(result, file, robot_file, path, others | {"plan": text})
 
 
-def with_robot(result: Result, file: str, keys: dict[str, Any]) -> Result:
+def with_robot(result: Result, file: str, spec: dict[str, Any]) -> Result:
     """A motion without robot and plan, with a robot, as a plan that takes the motion from its file."""
-    robot = keys["robot"]
+    robot = spec["robot"]
     _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
-    plan = plan_keys(keys, "--robot")
+    plan = checked_plan(spec, "--robot")
     robot_file = resolve_robot(plan.robot, "--robot", Path())
     # The cables of a platform that only translates are those of its pairs.
     robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
-    return _with_robot_file(result, file, robot_file, "--robot", {"plan": text_of(keys)})
+    return _with_robot_file(result, file, robot_file, "--robot", {"plan": json_text(spec)})
 
 
 def _refuse_kept(option: str, words: str, result: Result, file: str) -> None:
@@ -108,8 +109,8 @@ def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile,
     if not keeps_plan(result):
         error = f'"{quantity}" of a motion that keeps no robot and no plan'
         allowed = "must have its plan, --plan FILE.toml, or its robot, --robot, or be an HDF5 file of `cspr plan -o`"
-        raise InputError("--quantity", quantity, allowed, fault=error)
+        raise InputError("--quantity", quantity, allowed, problem=error)
     settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
     robot_file = checked(RobotFile, json.loads(settings), file)
-    return robot_file.equivalent() if robot_file.translation_only else robot_file, kept_plan(text, Path(file))
+    return robot_file.equivalent() if robot_file.translation_only else robot_file, plan_of_text(text, Path(file))

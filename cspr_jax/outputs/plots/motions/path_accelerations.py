@@ -28,7 +28,7 @@ class PathSamples(NamedTuple):
         number: of the segment, from 1 on.
         length: of the line, m.
         duration: s.
-        s: (n,) share of the path at each row.
+        s: (n,) fraction of the path at each row.
         rates: (n, 3) s'': the least feasible value, that of the motion, and the largest feasible value, 1/s^2.
     """
 
@@ -41,17 +41,17 @@ class PathSamples(NamedTuple):
 
 def path_figure(result: Result, file: str) -> Figure:
     """The acceleration along each line of a motion over the path, for at most six lines."""
-    robot_file, keys = robot_and_plan(result, file, "path_acceleration")
-    ways = _ways(result, robot_file, keys)
-    shown = [ways[k] for k in chosen(len(ways), PANELS)]
+    robot_file, plan_file = robot_and_plan(result, file, "path_acceleration")
+    paths = _paths(result, robot_file, plan_file)
+    shown = [paths[k] for k in chosen(len(paths), PANELS)]
     columns = columns_of(len(shown))
     rows = -(-len(shown) // columns)
-    size = (6.8, 4.8) if len(shown) == 1 else (3.8 * columns + 0.6, 3.3 * rows + 1.2)
-    figure = Figure(figsize=size, layout="constrained")
+    figure_size = (6.8, 4.8) if len(shown) == 1 else (3.8 * columns + 0.6, 3.3 * rows + 1.2)
+    figure = Figure(figsize=figure_size, layout="constrained")
     axes, bottom, left = panels(figure, len(shown), same=False)
-    for panel, way in zip(axes, shown, strict=True):
-        _draw(panel, way, keys.max_acceleration)
-        panel.set_title(f"segment {way.number}: {way.length:.4g} m in {way.duration:.4g} s")
+    for panel, path in zip(axes, shown, strict=True):
+        _draw(panel, path, plan_file.max_acceleration)
+        panel.set_title(f"segment {path.number}: {path.length:.4g} m in {path.duration:.4g} s")
     for panel in bottom:
         panel.set_xlabel("part of the way s")
     for panel in left:
@@ -64,30 +64,32 @@ def path_figure(result: Result, file: str) -> Figure:
     return figure
 
 
-def _ways(result: Result, robot_file: RobotFile, keys: PlanFile) -> list[PathSamples]:
-    time, ends = result.axes["t"], _poses(result, robot_file, keys)
+def _paths(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> list[PathSamples]:
+    time, ends = result.axes["t"], _poses(result, robot_file, plan_file)
     starts, waypoints = (result.data.get(f"segment_{name}", np.empty(0)) for name in ("start", "end"))
     if len(ends) != len(starts) + 1:
-        raise InputError("--quantity", "path_acceleration", "must be of a plan", fault="the plan has other segments")
+        raise InputError("--quantity", "path_acceleration", "must be of a plan", problem="the plan has other segments")
     first = [_first_row(time, start) for start in starts] + [len(time)]
-    ways = []
+    paths = []
     for k, (start, stop) in enumerate(zip(starts, waypoints, strict=True)):
         rows, line = slice(first[k], first[k + 1]), ends[k + 1] - ends[k]
         length = float(np.linalg.norm(line))
         if not length > 0.0 or first[k] == first[k + 1]:
             continue
         s = (result.data["position"][rows] - ends[k]) @ line / length**2
-        ways.append(PathSamples(k + 1, length, float(stop - start), s, result.data["path_acceleration"][rows] / length))
-    if not ways:
-        raise InputError("--quantity", "path_acceleration", "must be of a longer one", fault="a motion without rows")
-    return ways
+        paths.append(
+            PathSamples(k + 1, length, float(stop - start), s, result.data["path_acceleration"][rows] / length)
+        )
+    if not paths:
+        raise InputError("--quantity", "path_acceleration", "must be of a longer one", problem="a motion without rows")
+    return paths
 
 
-def _poses(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
+def _poses(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> np.ndarray:
     # Return (n, 3) as in the file; a rest pose without a position is P0.
     frame, depth = frame_of(robot_file.base_points, robot_file.z_axis), result.attributes.get("z0", np.nan)
     rest = frame.outward(np.array([0.0, 0.0, depth]))
-    return np.array([rest if pose.position is None else pose.position for pose in keys.pose])
+    return np.array([rest if pose.position is None else pose.position for pose in plan_file.pose])
 
 
 def _first_row(time: np.ndarray, start: float) -> int:
@@ -96,28 +98,28 @@ def _first_row(time: np.ndarray, start: float) -> int:
     return int(rows[0] + (rows[1] - rows[0]) // 2)
 
 
-def _draw(panel: Axes, way: PathSamples, max_acceleration: float | None) -> None:
-    minimum, actual, largest = way.rates.T
+def _draw(panel: Axes, path: PathSamples, max_acceleration: float | None) -> None:
+    minimum, actual, largest = path.rates.T
     far = BEYOND * (np.abs(actual).max() or 1.0)
     low, high = (np.clip(bound, -2.0 * far, 2.0 * far) for bound in (minimum, largest))
-    panel.fill_between(way.s, low, high, color=COLOURS[5], alpha=0.3, linewidth=0.0, label="feasible")
-    panel.plot(way.s, low, color=COLOURS[1], linewidth=1.3, linestyle="--", label="least feasible")
-    panel.plot(way.s, high, color=COLOURS[0], linewidth=1.3, linestyle="-.", label="largest feasible")
-    panel.plot(way.s, actual, color="black", linewidth=1.6, label="of the motion")
+    panel.fill_between(path.s, low, high, color=COLOURS[5], alpha=0.3, linewidth=0.0, label="feasible")
+    panel.plot(path.s, low, color=COLOURS[1], linewidth=1.3, linestyle="--", label="least feasible")
+    panel.plot(path.s, high, color=COLOURS[0], linewidth=1.3, linestyle="-.", label="largest feasible")
+    panel.plot(path.s, actual, color="black", linewidth=1.6, label="of the motion")
     panel.axhline(0.0, color="black", linewidth=0.8)
     rates = np.concatenate([low, actual, high])
     bottom, top = max(1.1 * np.nanmin(rates), -far), min(1.1 * np.nanmax(rates), far)
     for sign in (1.0, -1.0):
-        level = np.nan if max_acceleration is None else sign * max_acceleration / way.length
+        level = np.nan if max_acceleration is None else sign * max_acceleration / path.length
         if bottom < level < top:
             panel.axhline(level, color=COLOURS[3], linewidth=1.2, linestyle=":", label="largest allowed")
     panel.set(xlim=(0.0, 1.0), ylim=(bottom, top))
     panel.grid(alpha=0.3)
 
     def outward(rate: ArrayLike) -> np.ndarray:
-        return np.asarray(rate) * way.length
+        return np.asarray(rate) * path.length
 
     def inward(acceleration: ArrayLike) -> np.ndarray:
-        return np.asarray(acceleration) / way.length
+        return np.asarray(acceleration) / path.length
 
     panel.secondary_yaxis("right", functions=(outward, inward)).set_ylabel("acceleration (m/s²)")

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.outputs.plots.maps.frequencies import BAND, EDGE
+from cspr_jax.outputs.plots.maps.frequencies import BAND_COLOUR, EDGE
 from cspr_jax.outputs.plots.motions.motion import doubt
 from cspr_jax.outputs.plots.style.labels import COLOURS, STYLES, robot_name
 from cspr_jax.schema.verdicts import Verdict, criterion_words
@@ -31,7 +31,7 @@ def phase_plane_figure(result: Result) -> Figure:
     for i, rows in enumerate(map(slice, first[:-1], first[1:])):
         label = "_" if i else "the end can be reached"
         panel.fill_between(
-            s[rows], low[rows], np.minimum(high[rows], 2.0 * top), color=BAND, linewidth=0.0, label=label
+            s[rows], low[rows], np.minimum(high[rows], 2.0 * top), color=BAND_COLOUR, linewidth=0.0, label=label
         )
         for side in (low, high):
             panel.plot(s[rows], np.minimum(side[rows], 2.0 * top), color=EDGE, linewidth=0.8)
@@ -85,26 +85,26 @@ def _draw_motion(panel: Axes, data, rows: slice) -> None:
             continue
         line = np.where(at_nodes, speed, np.nan)
         words = criterion_words(Verdict(flag), cable - 1 if cable else None)
-        look = FREE if k == 0 else {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[(k - 1) // len(COLOURS)]}
-        panel.plot(s, line, label="motion, nothing binds" if k == 0 else words, linewidth=2.4, zorder=3.5, **look)
+        style = FREE if k == 0 else {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[(k - 1) // len(COLOURS)]}
+        panel.plot(s, line, label="motion, nothing binds" if k == 0 else words, linewidth=2.4, zorder=3.5, **style)
 
 
 def _draw_passes(panel: Axes, data) -> None:
     # Poses that the motion runs through.
     inside = (np.diff(data["path_segment"]) != 0) & (np.diff(data["path_section"]) == 0)
-    for k, place in enumerate(data["path_coordinate"][1:][inside].tolist()):
-        panel.axvline(place, color="0.35", linestyle=":", linewidth=1.2, label="_" if k else "pose")
+    for k, coordinate in enumerate(data["path_coordinate"][1:][inside].tolist()):
+        panel.axvline(coordinate, color="0.35", linestyle=":", linewidth=1.2, label="_" if k else "pose")
 
 
 def _draw_failures(panel: Axes, s: np.ndarray, low: np.ndarray, first: list[int]) -> None:
     # Up to the last place that no speed passes.
     is_named = False
     for rows in map(slice, first[:-1], first[1:]):
-        unknown, places = np.isnan(low[rows]), s[rows]
+        unknown, coordinates = np.isnan(low[rows]), s[rows]
         if not unknown.any():
             continue
-        last = places[np.flatnonzero(unknown)[-1]]
-        panel.axvspan(places[0], last, color="#c03030", alpha=0.12, linewidth=0.0)
+        last = coordinates[np.flatnonzero(unknown)[-1]]
+        panel.axvspan(coordinates[0], last, color="#c03030", alpha=0.12, linewidth=0.0)
         words = "_" if is_named else "no path speed passes"
         panel.plot([last], [0.0], "x", color="#c03030", markersize=10, markeredgewidth=2.4, clip_on=False, label=words)
         is_named = True

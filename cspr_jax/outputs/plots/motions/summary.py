@@ -18,7 +18,7 @@ from cspr_jax.outputs.plots.style.fitting import legend_above
 from cspr_jax.outputs.plots.style.labels import cable_names, line_look, margin_unit, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
 from cspr_jax.outputs.plots.style.scene import shape_of
-from cspr_jax.outputs.plots.style.verdict_colours import reasons
+from cspr_jax.outputs.plots.style.word_ticks import reasons
 from cspr_jax.schema.verdicts import NO_REASON
 from cspr_jax.store.reading.result import Result
 
@@ -28,25 +28,25 @@ SEGMENTS = 8
 LINE, NARROW_LINE = 0.28, 0.44
 ACROSS, LOW, HIGH = 6.6, 3.0, 6.4
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
-# Shares of the width, and letters of a line of the verdict: of a page, and of a column.
+# Fractions of the width, and letters of a line of the verdict: of a page, and of a column.
 WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)
 
 
-def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
+def summary_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Figure:
     """The plan on a page."""
     cells = _cells(result)
     lines = sum(_lines(row) for row in cells)
     height = (NARROW_LINE if is_narrow() else LINE) * (lines + 1)
-    space_height = float(np.clip(ACROSS * shape_of(points_in_space(result, robot_file, keys)), LOW, HIGH))
+    space_height = float(np.clip(ACROSS * shape_of(points_in_space(result, robot_file, plan_file)), LOW, HIGH))
     figure = Figure(figsize=(7.2, 4.8 + space_height + height), layout="constrained")
     parts = figure.add_gridspec(4, 1, height_ratios=[space_height, 2.0, 1.6, height])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
-    draw_trajectory(figure, space, result, robot_file, keys)
-    figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
+    draw_trajectory(figure, space, result, robot_file, plan_file)
+    figure.legend(*legend_of(result, plan_file), loc="outside lower center", ncols=6)
     over_time = figure.add_subplot(parts[1])
-    draw_tensions(over_time, result, limits_of(robot_file, keys), ("tension", "rate"))
+    draw_tensions(over_time, result, limits_of(robot_file, plan_file), ("tension", "rate"))
     legend_above(over_time, len(robot_file.base_points) + 5)
-    _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, keys, "speed"))
+    _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, plan_file, "speed"))
     if cells:
         _draw_table(figure.add_subplot(parts[3]), cells)
     words = f"{result.axes['t'][-1]:.4g} s{point_words(result.data)}\n{extremes(result)}{doubt(result)}"

@@ -14,11 +14,11 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look,
 from cspr_jax.store.reading.result import Result
 
 
-def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
+def tensions_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Figure:
     """The band of tensions over time, with the limits."""
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     panel = figure.subplots()
-    draw_tensions(panel, result, limits_of(robot_file, keys))
+    draw_tensions(panel, result, limits_of(robot_file, plan_file))
     figure.legend(loc="outside lower center", ncols=4)
     figure.suptitle(f"{robot_name(result)}: tensions over time\n{extremes(result)}{doubt(result)}")
     return figure
@@ -30,8 +30,8 @@ def extremes(result: Result) -> str:
     if not np.isfinite(tension).any():
         return "no finite tension"
     names, each = cable_names(result.data), []
-    for words, place in (("smallest", np.nanargmin(tension)), ("largest", np.nanargmax(tension))):
-        row, cable = np.unravel_index(place, tension.shape)
+    for words, index in (("smallest", np.nanargmin(tension)), ("largest", np.nanargmax(tension))):
+        row, cable = np.unravel_index(index, tension.shape)
         each.append(f"{words} {tension[row, cable]:.4g} N, {names[cable]}, t = {time[row]:.3g} s")
     return "; ".join(each)
 

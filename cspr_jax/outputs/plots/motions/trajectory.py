@@ -18,8 +18,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.motions.motion import doubt, point_words
-from cspr_jax.outputs.plots.robots.bodies_in_space import draw_bodies
-from cspr_jax.outputs.plots.robots.obstacles import AREA, points_of
+from cspr_jax.outputs.plots.robots.obstacles import AREA, draw_bodies, points_of
 from cspr_jax.outputs.plots.robots.robot_along import moving
 from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.style.scene import colours_of_tension, set_space, shape_of
@@ -32,39 +31,39 @@ if TYPE_CHECKING:
 SHOWN = 6
 # Inches: width of the robot, height of the texts above and below it, and heights of the picture.
 ACROSS, BESIDE, LOW, HIGH = 6.6, 1.9, 3.9, 7.6
-# Spools nearer to each other than this share of the largest distance have one label.
+# Spools nearer to each other than this fraction of the largest distance have one label.
 TOGETHER = 0.08
 
 
-def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
+def trajectory_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Figure:
     """The motion in space."""
-    points = points_in_space(result, robot_file, keys)
+    points = points_in_space(result, robot_file, plan_file)
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
-    draw_trajectory(figure, panel, result, robot_file, keys)
-    figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
+    draw_trajectory(figure, panel, result, robot_file, plan_file)
+    figure.legend(*legend_of(result, plan_file), loc="outside lower center", ncols=6)
     figure.suptitle(
         f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{point_words(result.data)}{doubt(result)}"
     )
     return figure
 
 
-def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> Float[np.ndarray, "n 3"]:
+def points_in_space(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Float[np.ndarray, "n 3"]:
     """Path, spools and corners of obstacles, which decide the shape of a picture."""
     return np.concatenate(
-        [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
+        [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, plan_file.bodies)]
     )
 
 
-def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile, keys: PlanFile) -> None:
+def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile, plan_file: PlanFile) -> None:
     """Path, spools, obstacles, flight of a released object, and the robot where segments begin and end."""
     ends = segment_rows(result.data, result.axes["t"])
     rows = ends[np.unique(np.linspace(0, len(ends) - 1, min(SHOWN, len(ends))).round().astype(int))]
-    robot, path = moving(result.data, robot_file, rows, keys), result.data["position"]
+    robot, path = moving(result.data, robot_file, rows, plan_file), result.data["position"]
     flight = result.data.get("flight_position", np.empty((0, 3)))
-    bodies, is_down = keys.bodies, result.attributes.get("z_axis", "down") == "down"
-    of_robot = [robot.ways.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+    bodies, is_down = plan_file.bodies, result.attributes.get("z_axis", "down") == "down"
+    of_robot = [robot.cable_points.reshape(-1, 3), robot.corners.reshape(-1, 3)]
     set_space(panel, np.concatenate([*of_robot, path, flight, *map(points_of, bodies)]), is_down=is_down)
     draw_bodies(panel, bodies, is_down=is_down)
     tension = result.data["tension"]
@@ -77,8 +76,8 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
     # A flat box is larger than its panel, which is a square.
     spools.set(clip_on=False, in_layout=False)
     name_spools(panel, robot.base)
-    for row, ways, corners in zip(rows, robot.ways, robot.corners, strict=True):
-        cables = Line3DCollection(ways, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
+    for row, paths, corners in zip(rows, robot.cable_points, robot.corners, strict=True):
+        cables = Line3DCollection(paths, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
         panel.add_collection3d(cables)
         cables.set(clip_on=False, in_layout=False)
         if len(corners):
@@ -103,14 +102,14 @@ def name_spools(panel: Any, base: Float[np.ndarray, "n_cables 3"]) -> None:
         words = ", ".join(str(k + 1) for k in group)
         # The words stand above the marks.
         above = panel.transData + ScaledTranslation(0.0, 0.06, panel.figure.dpi_scale_trans)
-        place, look = (
+        position, style = (
             base[group].mean(0),
             {"ha": "center", "va": "bottom", "fontsize": "small", "zorder": 6.0, "in_layout": False},
         )
-        panel.text(*place, words, transform=above, **look)
+        panel.text(*position, words, transform=above, **style)
 
 
-def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
+def legend_of(result: Result, plan_file: PlanFile) -> tuple[list[Artist], list[str]]:
     """Entries of the legend of a motion in space."""
     entries: dict[str, Artist] = {
         "path": Line2D([], [], color="black", linewidth=1.2),
@@ -118,7 +117,7 @@ def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
         "cables": Line2D([], [], color=colours_of_tension()(0.6), linewidth=1.6),
         "spools, by cable": Line2D([], [], linestyle="", marker="s", color="0.35"),
     }
-    if keys.obstacle:
+    if plan_file.obstacle:
         entries["obstacles"] = Patch(**AREA)
     if "flight_position" in result.data:
         entries["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")

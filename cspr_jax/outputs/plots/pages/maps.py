@@ -1,6 +1,8 @@
 """Content of a page about a map: its axes, quantities with their colours, and the reasons of its cells."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, to_hex
@@ -8,19 +10,23 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.maps.conditions import is_margin, said, shown_first
-from cspr_jax.outputs.plots.maps.planes import in_order
-from cspr_jax.outputs.plots.pages.packing import packed
+from cspr_jax.outputs.plots.maps.sections import in_order
+from cspr_jax.outputs.plots.pages.page import packed
 from cspr_jax.outputs.plots.robots.obstacles import COLOUR, obstacles, outline, section_of
 from cspr_jax.outputs.plots.robots.robot_at import robot_of, workspace_of
 from cspr_jax.outputs.plots.style.colours import Scale, scale_of
 from cspr_jax.outputs.plots.style.fixed_axes import notes
 from cspr_jax.outputs.plots.style.labels import WORDS, as_drawn, axis_label, label, unit, value
-from cspr_jax.outputs.plots.style.verdict_colours import FEASIBLE_COLOUR, REASONS
-from cspr_jax.outputs.plots.style.word_ticks import word_scale, worded
+from cspr_jax.outputs.plots.style.word_ticks import FEASIBLE_COLOUR, REASONS, word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
 from cspr_jax.store.reading.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Int
+
+# Quantities whose extremes are instructive.
+EXTREME = ("margin", "duration", "arcs", "oscillations")
 # Quantities that come first, and letters of all that a page may hold; the script of the charts has some five millions.
 FIRST = ("verdict", "duration", "margin")
 LARGEST = 14_000_000
@@ -42,24 +48,24 @@ def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
 def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, Any], list[str]]:
     """Content of the page of a map."""
     kind = MAP_KINDS[result.attributes["map"]]
-    known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
-    if quantity is not None and quantity not in known:
+    available = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
+    if quantity is not None and quantity not in available:
         raise InputError("--quantity", quantity, one_of(quantity, sorted(result.data)))
-    known = [name for name in known if name == quantity or _is_asked(result, name)] or known[:1]
+    available = [name for name in available if name == quantity or _is_asked(result, name)] or available[:1]
     first = quantity or shown_first(result)
-    first = first if first in known else known[0]
+    first = first if first in available else available[0]
     names, points = order_of(result)
-    places = [list(result.axes).index(name) for name in names]
+    order = [list(result.axes).index(name) for name in names]
     shape = [len(chosen) for chosen in points]
 
     def arranged(name: str) -> np.ndarray:
-        return result.data[name].transpose(places)[np.ix_(*points)]
+        return result.data[name].transpose(order)[np.ix_(*points)]
 
-    quantities, left, room = list[dict[str, Any]](), list[str](), LARGEST
-    for name in sorted(known, key=lambda name: name != first):
+    quantities, left, remaining = list[dict[str, Any]](), list[str](), LARGEST
+    for name in sorted(available, key=lambda name: name != first):
         content = _quantity(result, name, arranged(name))
-        room -= len(content["values"]["data"])
-        if room < 0 and quantities:
+        remaining -= len(content["values"]["data"])
+        if remaining < 0 and quantities:
             left.append(name)
             continue
         quantities.append(content)
@@ -107,14 +113,14 @@ def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> di
     if not bodies:
         return None
     third = next(axis for axis in SPACE if axis not in plane)
-    places = result.axes[third][points[names.index(third)]] if third in names else []
+    heights = result.axes[third][points[names.index(third)]] if third in names else []
     return {
         "axis": names.index(third) if third in names else None,
         "colour": COLOUR,
         "bodies": [
             {
                 "shadow": _closed(outline(body[:, [SPACE.index(axis) for axis in plane]])),
-                "cuts": [_closed(section_of(body, plane, place)) for place in places],
+                "cuts": [_closed(section_of(body, plane, height)) for height in heights],
             }
             for body in bodies
         ],
@@ -180,9 +186,9 @@ def _scale(scale: Scale) -> dict[str, Any]:
     }
 
 
-def _hex(scale: Scale, place: float) -> str:
-    # A whole number is the number of a colour, a fraction a place on the scale; beyond the last one is what lies over.
-    red, green, blue, alpha = scale.colours(place)
+def _hex(scale: Scale, position: float) -> str:
+    # A whole number is the number of a colour, a fraction a position on the scale; beyond the last one is the rest.
+    red, green, blue, alpha = scale.colours(position)
     return to_hex((red, green, blue, alpha))
 
 
@@ -203,3 +209,41 @@ def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
             }
         )
     return {"entries": entries, "values": packed(index.reshape(verdicts.shape))}
+
+
+def informative_cells(
+    data: dict[str, np.ndarray], verdict: Int[np.ndarray, "..."], count: int
+) -> list[tuple[int, ...]]:
+    """Cells to look at, all of them feasible.
+
+    First come the extremes of margins, durations and counts, and for each count the cell with the smallest margin;
+    then, one after the other, the cell that is farthest from the chosen ones, in steps of the grid over its size.
+    """
+    feasible = np.argwhere(verdict == 0)
+    if not len(feasible) or count < 1:
+        return []
+    where = tuple(feasible.T)
+    values = {name: data[name][where].astype(float) for name in EXTREME if name in data}
+    chosen = list(dict.fromkeys(_extremes(values)))[:count]
+    if not chosen:
+        chosen = [0]
+    points = feasible / np.maximum(np.array(verdict.shape) - 1.0, 1.0)
+    gap = np.min([np.square(points - points[i]).sum(1) for i in chosen], axis=0)
+    while len(chosen) < min(count, len(feasible)):
+        chosen.append(int(np.argmax(gap)))
+        gap = np.minimum(gap, np.square(points - points[chosen[-1]]).sum(1))
+    return [tuple(int(i) for i in feasible[k]) for k in chosen]
+
+
+def _extremes(values: dict[str, np.ndarray]) -> list[int]:
+    cells = []
+    for numbers in values.values():
+        if np.isfinite(numbers).any():
+            cells += [int(np.nanargmin(numbers)), int(np.nanargmax(numbers))]
+    counts = next((values[name] for name in ("arcs", "oscillations") if name in values), None)
+    if counts is not None and "margin" in values:
+        for number in np.unique(counts):
+            minimum = np.where(counts == number, values["margin"], np.inf)
+            if np.isfinite(minimum).any():
+                cells.append(int(np.argmin(minimum)))
+    return cells

@@ -7,16 +7,14 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.motions.failing import failing_in
-from cspr_jax.outputs.plots.motions.motion import point_words
-from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.robots.bodies_in_space import lines_on
-from cspr_jax.outputs.plots.robots.obstacles import points_of
+from cspr_jax.outputs.plots.motions.motion import failing_in, point_words
+from cspr_jax.outputs.plots.pages.page import packed
+from cspr_jax.outputs.plots.robots.obstacles import lines_on, points_of
 from cspr_jax.outputs.plots.robots.robot_along import limits_of, moving
 from cspr_jax.outputs.plots.robots.robot_at import hull_of
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.outputs.plots.style.labels import WRITTEN, cable_names, margin_unit
-from cspr_jax.outputs.plots.style.verdict_colours import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.style.word_ticks import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
 from cspr_jax.robots.model.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
@@ -39,16 +37,16 @@ def motion_content(
     columns: Mapping[str, np.ndarray],
     segments: Mapping[str, np.ndarray],
     robot_file: RobotFile | None,
-    keys: PlanFile | None,
+    plan_file: PlanFile | None,
     z_axis: str = "down",
 ) -> dict[str, Any]:
     """Content of the page of a motion."""
     rows = _chosen(np.asarray(columns["t"]))
-    robot = moving(columns, robot_file, rows, keys)
+    robot = moving(columns, robot_file, rows, plan_file)
     return {
         "title": title,
         "facts": [
-            *_facts(np.asarray(columns["t"]), segments, robot_file, keys),
+            *_facts(np.asarray(columns["t"]), segments, robot_file, plan_file),
             *([("path", point_words(columns).removeprefix(", "))] if point_words(columns) else []),
             *_bounds(columns),
             *_failures(columns),
@@ -61,40 +59,40 @@ def motion_content(
         "path": packed(robot.position),
         "attached": packed(robot.attached),
         # Points on pulleys, between where cables enter and where they are attached.
-        "arcs": packed(robot.ways[:, :, 1:-1]),
-        "onArc": robot.ways.shape[2] - 2,
+        "arcs": packed(robot.cable_points[:, :, 1:-1]),
+        "onArc": robot.cable_points.shape[2] - 2,
         "corners": packed(robot.corners),
         "edges": robot.corners.shape[1] // 2,
         **{name: packed(np.asarray(columns[name])[rows]) for name in OF_CABLES if name in columns},
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
-        "limits": {name: _limits(robot_file, keys, quantity) for name, quantity in OF_CABLES.items()},
+        "limits": {name: _limits(robot_file, plan_file, quantity) for name, quantity in OF_CABLES.items()},
         "segments": _segments(segments),
         "paths": _paths(columns),
         "failing": np.asarray(columns.get("failing", ())).tolist(),
         "failingIn": {name: failing_in(columns, name, CHARTS).tolist() for name in CHARTS},
-        "bodies": [_surface(body) for body in ([] if keys is None else keys.bodies)],
+        "bodies": [_surface(body) for body in ([] if plan_file is None else plan_file.bodies)],
     }
 
 
-def _limits(robot_file: RobotFile | None, keys: PlanFile | None, quantity: str) -> list[dict[str, Any]]:
-    if robot_file is None or keys is None:
+def _limits(robot_file: RobotFile | None, plan_file: PlanFile | None, quantity: str) -> list[dict[str, Any]]:
+    if robot_file is None or plan_file is None:
         return []
-    return [{"words": words, "value": value} for words, value in limits_of(robot_file, keys, quantity)]
+    return [{"words": words, "value": value} for words, value in limits_of(robot_file, plan_file, quantity)]
 
 
 def _facts(
-    time: np.ndarray, segments: Mapping[str, np.ndarray], robot_file: RobotFile | None, keys: PlanFile | None
+    time: np.ndarray, segments: Mapping[str, np.ndarray], robot_file: RobotFile | None, plan_file: PlanFile | None
 ) -> list[tuple[str, str]]:
     # Describe robot, limits and duration in words.
     count = len(segments.get("segment_end", ()))
     of_segments = f" in {count} segment{'s' if count > 1 else ''}" if count else ""
     facts = [("duration", f"{time[-1] - time[0]:.4g} s{of_segments}")]
-    if robot_file is None or keys is None:
+    if robot_file is None or plan_file is None:
         return [("robot", "the file keeps neither robot nor limits; --plan gives them"), *facts]
     body = "platform" if robot_file.is_platform else "point mass"
     cables = f"on {len(robot_file.base_points)} cables, z {robot_file.z_axis}"
     robot = f"{shortened(robot_file.name)}, {body} of {robot_file.mass:.4g} kg {cables}"
-    limits = ", ".join(filter(None, (_bound(row, limits_of(robot_file, keys, row)) for row in UNITS)))
+    limits = ", ".join(filter(None, (_bound(row, limits_of(robot_file, plan_file, row)) for row in UNITS)))
     return [("robot", robot), ("limits", limits or "none, but that all cables are taut"), *facts]
 
 
@@ -163,8 +161,8 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
 def _chosen(time: np.ndarray) -> np.ndarray:
     # Choose rows evenly in time, as many as there are or a page takes; where segments meet rows are twice.
     count = min(len(time), MOST_ROWS)
-    instants = np.linspace(time[0], time[-1], count)
-    return np.unique(np.clip(np.searchsorted(time, instants - 1e-12), 0, len(time) - 1))
+    times = np.linspace(time[0], time[-1], count)
+    return np.unique(np.clip(np.searchsorted(time, times - 1e-12), 0, len(time) - 1))
 
 
 def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:

@@ -1,18 +1,29 @@
-"""A page in one file: its content, the library of its charts, and the scripts that join the two."""
+"""A page in one file: its content with arrays packed, the library of its charts, and the scripts that join them."""
 
+from __future__ import annotations
+
+import base64
+import gzip
 import html
 import json
 import re
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import InputError
 
+if TYPE_CHECKING:
+    from jaxtyping import Int
+
+# Names of the typed arrays of browsers, by NumPy's names.
+TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 # The page's own parts, in the order in which a browser reads them.
 SCRIPTS = ("page.js", "map.js", "motion.js", "solid.js", "start.js")
 STYLE, FRAME = "page.css", "page.html"
-PLACE = re.compile(r"<!-- (\w+) -->")
+PLACEHOLDER = re.compile(r"<!-- (\w+) -->")
 
 
 def page_of(title: str, content: dict[str, Any]) -> str:
@@ -31,9 +42,30 @@ def page_of(title: str, content: dict[str, Any]) -> str:
         "content": data,
         "scripts": "\n".join(_part(name) for name in SCRIPTS),
     }
-    # One pass replaces all places, so that inserted text is not searched again.
-    return PLACE.sub(lambda match: parts[match[1]], _part(FRAME))
+    # One pass replaces all placeholders, so that inserted text is not searched again.
+    return PLACEHOLDER.sub(lambda match: parts[match[1]], _part(FRAME))
 
 
 def _part(name: str) -> str:
     return (files(__package__) / name).read_text("utf-8")
+
+
+def packed(values: Int[np.ndarray, "..."]) -> dict[str, Any]:
+    """Values for a page."""
+    values = np.asarray(values)
+    if values.dtype.kind == "f":
+        name = "float32"
+        values = np.clip(values, -3e38, 3e38, where=np.isfinite(values), out=values.astype(float))
+    else:
+        low, high = int(values.min(initial=0)), int(values.max(initial=0))
+        name = "int32" if low < 0 or high > 65535 else "uint8" if high < 256 else "uint16"
+    # The time of writing is left out, so that the same values are the same text.
+    data = gzip.compress(np.ascontiguousarray(values, np.dtype(name).newbyteorder("<")).tobytes(), 6, mtime=0)
+    return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
+
+
+def unpacked(array: dict[str, Any]) -> Int[np.ndarray, "n"]:
+    """Values of a page, as a browser has them."""
+    name = next(name for name, other in TYPES.items() if other == array["type"])
+    data = gzip.decompress(base64.b64decode(array["data"]))
+    return np.frombuffer(data, np.dtype(name).newbyteorder("<"))

@@ -7,13 +7,13 @@ import numpy as np
 
 from cspr_jax.outputs.plots.maps.boundary import boundary, sides_of
 from cspr_jax.outputs.plots.maps.solid import SPACE, is_solid, middle_of, volume_words
-from cspr_jax.outputs.plots.pages.packing import packed
+from cspr_jax.outputs.plots.pages.page import packed
 from cspr_jax.outputs.plots.robots.obstacles import faces_of, obstacles
 from cspr_jax.outputs.plots.robots.robot_at import posed
 from cspr_jax.store.reading.result import Result
 
 # A page holds so many boundaries at most: one for each point of the other axes, or else that of their first points.
-MOST = 16
+LARGEST_COUNT = 16
 
 
 def solids_content(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
@@ -21,12 +21,12 @@ def solids_content(result: Result, names: list[str], points: list[np.ndarray]) -
     if not is_solid(result):
         return None
     others = [k for k, name in enumerate(names) if name not in SPACE and len(points[k]) > 1]
-    if np.prod([len(points[k]) for k in others]) > MOST:
+    if np.prod([len(points[k]) for k in others]) > LARGEST_COUNT:
         others = []
     solids = []
     for chosen in itertools.product(*(points[k].tolist() for k in others)):
         index = {axis: 0 for axis in result.axes if axis not in SPACE}
-        solids.append(_solid(result, index | {names[k]: place for k, place in zip(others, chosen, strict=True)}))
+        solids.append(_solid(result, index | {names[k]: i for k, i in zip(others, chosen, strict=True)}))
     return {
         "axes": others,
         "counts": [len(points[k]) for k in others],
@@ -45,13 +45,13 @@ def _solid(result: Result, index: dict[str, int]) -> dict[str, Any] | None:
     if not (sides.verdict == 0).any():
         return None
     surface = boundary(sides)
-    robot = posed(result, middle_of(sides), {axis: float(result.axes[axis][place]) for axis, place in index.items()})
+    robot = posed(result, middle_of(sides), {axis: float(result.axes[axis][i]) for axis, i in index.items()})
     return {
         "corners": packed(surface.corners),
         "pieces": packed(surface.pieces.astype(np.int32)),
         "isEnd": packed(surface.is_end.astype(np.uint8)),
         "volume": volume_words(result, index),
-        "ways": np.round(robot.ways, 6).tolist(),
+        "ways": np.round(robot.cable_points, 6).tolist(),
         "edges": np.round(robot.edges, 6).tolist(),
     }
 

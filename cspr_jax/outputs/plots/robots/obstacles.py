@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,15 +10,19 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Polygon
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.outputs.plots.robots.robot_at import hull_of, workspace_of
+from cspr_jax.outputs.plots.style.scene import across_and_up
 from cspr_jax.robots.model.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
+# Points of a circle.
+CIRCLE_POINTS = 48
 COLOUR = "#5c3d2e"
 AREA: dict[str, Any] = {"facecolor": (*to_rgb(COLOUR), 0.35), "edgecolor": COLOUR, "linewidth": 0.8}
 # Directions of the points of a ball: of azimuths and of heights.
@@ -30,7 +34,7 @@ def obstacles(result: Result) -> list[np.ndarray]:
     """Obstacles of a map of a workspace or of motions; all are convex."""
     if "map" not in result.attributes or not result.settings:
         return []
-    tables = SurroundingsKeys(obstacle=result.settings.get("obstacle"))
+    tables = ObstacleKeys(obstacle=result.settings.get("obstacle"))
     return [points_of(body) for body in (*workspace_of(result).bodies, *tables.bodies)]
 
 
@@ -46,7 +50,7 @@ def points_of(shape: Obstacle) -> Float[np.ndarray, "n 3"]:
 
 
 def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int]) -> None:
-    """Draw the shadows of obstacles beside a path, and make room for them."""
+    """Draw the shadows of obstacles beside a path, and widen the axes for them."""
     for number, body in enumerate(bodies):
         shadow = outline(points_of(body)[:, across])
         if len(shadow):
@@ -65,19 +69,19 @@ def outline(points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         return np.empty((0, 2))
 
 
-def section_of(points: Float[np.ndarray, "n 3"], across: list[str], place: float) -> Float[np.ndarray, "m 2"]:
+def section_of(points: Float[np.ndarray, "n 3"], across: list[str], coordinate: float) -> Float[np.ndarray, "m 2"]:
     """Section of a convex body with the plane over two axes."""
     axis = next(k for k, name in enumerate("xyz") if name not in across)
     _, edges = hull_of(points)
     start, end = edges[:, 0], edges[:, 1]
-    low, high = start[:, axis] - place, end[:, axis] - place
+    low, high = start[:, axis] - coordinate, end[:, axis] - coordinate
     cut = low * high <= 0.0
     part = (low / np.where(low == high, 1.0, low - high))[cut, None]
-    met = np.concatenate([start[cut] + part * (end - start)[cut], points[points[:, axis] == place]])
+    met = np.concatenate([start[cut] + part * (end - start)[cut], points[points[:, axis] == coordinate]])
     return outline(met[:, ["xyz".index(name) for name in across]])
 
 
-def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
+def draw_obstacles(panel: Axes, result: Result, across: list[str], coordinates: dict[str, float]) -> dict[str, Artist]:
     """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed where they are hidden."""
     if not set(across) < set("xyz"):
         return {}
@@ -85,8 +89,8 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
     columns, third = ["xyz".index(axis) for axis in across], next(axis for axis in "xyz" if axis not in across)
     for points in obstacles(result):
         shadow, cut = outline(points[:, columns]), np.empty((0, 2))
-        if third in place:
-            cut = section_of(points, across, place[third])
+        if third in coordinates:
+            cut = section_of(points, across, coordinates[third])
         if len(cut):
             panel.add_patch(Polygon(cut, facecolor=COLOUR, edgecolor="white", linewidth=0.8))
             entries["obstacle"] = Patch(facecolor=COLOUR)
@@ -100,3 +104,31 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
 def faces_of(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3 3"]:
     """Surface of a convex body."""
     return hull_of(points)[0]
+
+
+def draw_bodies(panel: Any, bodies: Sequence[Obstacle], *, is_down: bool) -> None:
+    """Draw obstacles behind cables and path, which stay visible."""
+    view = across_and_up(is_down=is_down)
+    for body in bodies:
+        points = points_of(body)
+        middle = points.mean(0)
+        area = middle + outline((points - middle) @ view.T) @ view
+        panel.add_collection3d(Poly3DCollection([area], **AREA, zorder=1.5))
+        lines = Line3DCollection(lines_on(body), colors=COLOUR, linewidths=0.7, alpha=0.6, zorder=1.6)
+        panel.add_collection3d(lines)
+
+
+def lines_on(body: Obstacle) -> list[np.ndarray]:
+    """Lines that show the shape of an obstacle: edges of a box, circles about the ends of a cylinder, or on a ball."""
+    if isinstance(body, Box):
+        return list(hull_of(points_of(body))[1])
+    if isinstance(body, Cylinder):
+        return [_circle(end, body.end - body.start, body.radius) for end in (body.start, body.end)]
+    return [_circle(body.centre, axis, body.radius) for axis in np.eye(3)]
+
+
+def _circle(centre: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
+    # The right singular vectors behind the first one are at right angles to the normal.
+    _, first, second = np.linalg.svd(normal[None])[2]
+    angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS + 1)[:, None]
+    return centre + radius * (np.cos(angle) * first + np.sin(angle) * second)

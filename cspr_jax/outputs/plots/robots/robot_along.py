@@ -9,9 +9,8 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.robots.cable_paths import cable_ways
 from cspr_jax.outputs.plots.robots.obstacles import points_of
-from cspr_jax.outputs.plots.robots.robot_at import hull_of
+from cspr_jax.outputs.plots.robots.robot_at import cable_points, hull_of
 from cspr_jax.robots.model.shapes import Hull, rotation_matrix
 from cspr_jax.schema.limits import LIMITS
 
@@ -26,14 +25,14 @@ class Moving(NamedTuple):
         base: (n_cables, 3) where the cables leave, m.
         position: (n, 3) of the effector at each row, m.
         attached: (n, n_cables, 3) where the cables are attached, m.
-        ways: (n, n_cables, m, 3) points that the cables are drawn through, from `base` to `attached`, m.
+        cable_points: (n, n_cables, m, 3) points that the cables are drawn through, from `base` to `attached`, m.
         corners: (n, 2 n_edges, 3) ends of the platform's edges, one after the other, m; none of a point mass.
     """
 
     base: np.ndarray
     position: np.ndarray
     attached: np.ndarray
-    ways: np.ndarray
+    cable_points: np.ndarray
     corners: np.ndarray
 
 
@@ -41,7 +40,7 @@ def moving(
     columns: Mapping[str, np.ndarray],
     robot_file: RobotFile | None,
     rows: Int[np.ndarray, "n"],
-    keys: PlanFile | None = None,
+    plan_file: PlanFile | None = None,
 ) -> Moving:
     """The robot at rows of its motion."""
     position, quaternion = np.asarray(columns["position"])[rows], columns.get("quaternion")
@@ -55,7 +54,7 @@ def moving(
     body = body - centre
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges, quaternion = _edges(robot_file, keys, body, centre), np.asarray(quaternion)[rows]
+        edges, quaternion = _edges(robot_file, plan_file, body, centre), np.asarray(quaternion)[rows]
         # With more cables the reference orientation is that of the axes, and jax need not be loaded.
         if "mass_centre" not in columns and len(base) <= 6:
             from cspr_jax.outputs.platform_poses import of_own_axes
@@ -66,13 +65,13 @@ def moving(
     attached, corners = (
         position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
     )
-    return Moving(base, position, attached, cable_ways(robot_file, attached), corners)
+    return Moving(base, position, attached, cable_points(robot_file, attached), corners)
 
 
-def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def _edges(robot_file: RobotFile, plan_file: PlanFile | None, attached: np.ndarray, centre: np.ndarray) -> np.ndarray:
     # Edges (n, 2, 3) of the platform, from the point whose positions the motion holds.
     points = robot_file.platform_points or ()
-    shape = None if keys is None else keys.body(centre.tolist(), points)
+    shape = None if plan_file is None else plan_file.body(centre.tolist(), points)
     if isinstance(shape, Hull):
         return shape.edges
     return hull_of(attached if shape is None else points_of(shape))[1]

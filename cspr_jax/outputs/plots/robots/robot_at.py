@@ -11,14 +11,14 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.tolerances import UNIT_NORM
-from cspr_jax.outputs.plots.robots.cable_paths import cable_ways
 from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Num
 
+ON_ARC = 9  # points that an arc is drawn through, its ends included
 TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}
 
 
@@ -27,15 +27,15 @@ class Posed(NamedTuple):
 
     Fields:
         base: (n_cables, 3) where the cables leave, m.
-        attached: (n_cables, 3) where they are attached, for a point mass its place, m.
-        ways: (n_cables, m, 3) points that they are drawn through, m.
+        attached: (n_cables, 3) where they are attached, for a point mass its position, m.
+        cable_points: (n_cables, m, 3) points that they are drawn through, m.
         faces: (m, 3, 3) triangles of the hull of these points, m; empty where they lie on a line.
         edges: (k, 2, 3) edges of it, m.
     """
 
     base: np.ndarray
     attached: np.ndarray
-    ways: np.ndarray
+    cable_points: np.ndarray
     faces: np.ndarray
     edges: np.ndarray
 
@@ -50,22 +50,22 @@ def workspace_of(result: Result) -> WorkspaceTable:
     return WorkspaceTable(**table(result.settings, "workspace"))
 
 
-def posed(result: Result, place: Float[np.ndarray, "3"], angles: dict[str, float]) -> Posed:
-    """The robot of a map of a workspace, with the origin of the platform frame at a place."""
+def posed(result: Result, position: Float[np.ndarray, "3"], angles: dict[str, float]) -> Posed:
+    """The robot of a map of a workspace, with the origin of the platform frame at a position."""
     robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
     quaternion = np.array(workspace_of(result).orientation or IDENTITY)
-    size = np.linalg.norm(quaternion)
-    if abs(size - 1.0) > UNIT_NORM:
+    norm = np.linalg.norm(quaternion)
+    if abs(norm - 1.0) > UNIT_NORM:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
-    rotation = rotation @ rotation_matrix(quaternion / size)
+    rotation = rotation @ rotation_matrix(quaternion / norm)
     base = np.array(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
     faces, edges = hull_of(body)
-    attached = place + body @ rotation.T
+    attached = position + body @ rotation.T
     return Posed(
-        base, attached, cable_ways(robot_file, attached), place + faces @ rotation.T, place + edges @ rotation.T
+        base, attached, cable_points(robot_file, attached), position + faces @ rotation.T, position + edges @ rotation.T
     )
 
 
@@ -88,3 +88,30 @@ def hull_of(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "m 3 3"
     ring = points[ConvexHull(flat).vertices]
     faces = [ring[[0, k, k + 1]] for k in range(1, len(ring) - 1)]
     return np.array(faces), np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+
+
+def cable_points(
+    robot_file: RobotFile, attached: Float[np.ndarray, "... n_cables 3"]
+) -> Num[np.ndarray, "... n_cables m 3"]:
+    """Points that cables are drawn through."""
+    entry = np.asarray(robot_file.base_points, float)
+    if robot_file.pulley_radius is None:
+        return np.stack([np.broadcast_to(entry, attached.shape), attached], axis=-2)
+    up = [0.0, 0.0, 1.0 if robot_file.z_axis == "up" else -1.0]
+    axis = np.broadcast_to(np.asarray(up if robot_file.pulley_axes is None else robot_file.pulley_axes), entry.shape)
+    axis = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+    radius = np.broadcast_to(np.asarray(robot_file.pulley_radius, float), len(entry))
+    ray = attached - entry
+    high = np.sum(ray * axis, axis=-1)
+    aside = ray - high[..., None] * axis
+    wide = np.linalg.norm(aside, axis=-1)
+    side = aside / np.where(wide > 0.0, wide, 1.0)[..., None]
+    # Angles about the centre of the pulley, from where the cable enters: of the attachment, and of where it leaves.
+    across = wide - radius
+    with np.errstate(invalid="ignore"):
+        free = np.sqrt(across**2 + high**2 - radius**2)
+    left = np.arctan2(high, -across) % (2.0 * np.pi) - np.arctan2(free, radius)
+    angles = np.maximum(left, 0.0)[..., None] * np.linspace(0.0, 1.0, ON_ARC)
+    along, up_axis = (1.0 - np.cos(angles)) * radius[:, None], np.sin(angles) * radius[:, None]
+    arc = entry[:, None] + along[..., None] * side[..., None, :] + up_axis[..., None] * axis[:, None]
+    return np.concatenate([arc, attached[..., None, :]], axis=-2)

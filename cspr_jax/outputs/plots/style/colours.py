@@ -15,9 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from cspr_jax.outputs.plots.style.layout import is_narrow
 
 NONE_COLOUR = "#d0d0d0"
-# The scale ends where this share of the cells does, if a scale of all cells would be longer by this factor. If there
+# The scale ends where this fraction of the cells does, if a scale of all cells would be longer by this factor. If there
 # are no more cells than the third number, all count; if there are more, at least one may lie beyond.
-MOST, STRETCH, FEW = 0.98, 1.5, 10
+BULK_FRACTION, LARGEST_RATIO, FEW = 0.98, 1.5, 10
 # Up to so many counts always have a colour each.
 TOLD_APART = 12
 # Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
@@ -34,7 +34,7 @@ class Scale:
         extend: ends at which values lie beyond: "neither", "min", "max" or "both".
         beyond: words for the values that lie beyond; empty for none.
         ticks: of the bar, with their texts; None: chosen automatically.
-        whole: whether all values are whole numbers.
+        is_integer: whether all values are whole numbers.
         missing: whether there are cells without a value.
     """
 
@@ -43,7 +43,7 @@ class Scale:
     extend: str = "neither"
     beyond: str = ""
     ticks: tuple[list[float], list[str]] | None = None
-    whole: bool = False
+    is_integer: bool = False
     missing: bool = False
 
 
@@ -58,12 +58,12 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if signed:
         maximum = _bulk(np.abs(inside)) if inside.size else 1.0
         high = max(abs(low), abs(high)) or 1.0
-        maximum = maximum if high > STRETCH * maximum > 0.0 else high
+        maximum = maximum if high > LARGEST_RATIO * maximum > 0.0 else high
         minimum, low = -maximum, -high
     elif inside.size:
         upper, lower = _bulk(inside), -_bulk(-inside)
-        maximum = upper if high - low > STRETCH * (upper - low) > 0.0 else high
-        minimum = lower if maximum - low > STRETCH * (maximum - lower) > 0.0 else low
+        maximum = upper if high - low > LARGEST_RATIO * (upper - low) > 0.0 else high
+        minimum = lower if maximum - low > LARGEST_RATIO * (maximum - lower) > 0.0 else low
     above, below = bool((data > maximum).any()), bool((data < minimum).any())
     colours = matplotlib.colormaps["PuOr_r" if signed else "cividis"].with_extremes(bad=NONE_COLOUR)
     if maximum <= minimum:
@@ -79,14 +79,14 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
         Normalize(minimum, maximum),
         extend,
         ", ".join(words),
-        whole=full,
+        is_integer=full,
         missing=bool(np.isnan(data).any()),
     )
 
 
 def _bulk(values: np.ndarray) -> float:
     # Return a value that occurs, not one between two values.
-    part = 1.0 if values.size <= FEW else min(MOST, 1.0 - 1.5 / values.size)
+    part = 1.0 if values.size <= FEW else min(BULK_FRACTION, 1.0 - 1.5 / values.size)
     return float(np.quantile(values, part, method="inverted_cdf"))
 
 
@@ -95,7 +95,7 @@ def _of_counts(data: np.ndarray) -> Scale:
     counts = data[data > 0]
     minimum, maximum = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
     bulk = int(_bulk(counts)) if counts.size else 1
-    stretched = maximum - minimum + 1 > max(TOLD_APART, STRETCH * (bulk - minimum + 1))
+    stretched = maximum - minimum + 1 > max(TOLD_APART, LARGEST_RATIO * (bulk - minimum + 1))
     end = max(bulk, minimum + TOLD_APART // 2) if stretched else maximum
     number, more, none = end - minimum + 1, end < maximum, bool((data <= 0).any())
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
@@ -109,7 +109,7 @@ def _of_counts(data: np.ndarray) -> Scale:
     shown = [NONE_COLOUR, *shades[:number]] if none else list(shades[:number])
     colours = ListedColormap(shown).with_extremes(over=shades[-1])
     beyond, extend = (f"up to {maximum}", "max") if more else ("", "neither")
-    return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
+    return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), is_integer=True)
 
 
 def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> dict[str, Artist]:
@@ -123,7 +123,7 @@ def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str)
     if scale.ticks is not None:
         bar.set_ticks(scale.ticks[0], labels=scale.ticks[1])
         bar.ax.minorticks_off()
-    elif scale.whole:
+    elif scale.is_integer:
         bar.locator = MaxNLocator(8, integer=True)
         bar.update_ticks()
     return {}

@@ -21,24 +21,24 @@ SHORTEST = 8
 HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
 # Beginning of the line of a title that names segments without a proof.
 DOUBT = "NOT PROVED FEASIBLE"
-# Share of a panel's place that its tick labels leave free.
+# Fraction of a panel's slot that its tick labels leave free.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
 # Largest numbers of intervals between ticks, tried one after the other.
 FEWER_TICKS = (5, 4, 3, 2, 1)
 
 
-def shortened(text: str, most: int = LONGEST_NAME) -> str:
+def shortened(text: str, maximum: int = LONGEST_NAME) -> str:
     """A text from a file, on one line and not too long."""
     text = printable(text)
-    if len(text) <= most:
+    if len(text) <= maximum:
         return text
-    tail = (most - 3) // 3
-    return f"{text[: most - 3 - tail]}...{text[len(text) - tail :]}"
+    tail = (maximum - 3) // 3
+    return f"{text[: maximum - 3 - tail]}...{text[len(text) - tail :]}"
 
 
 def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> None:
-    """Break titles and labels that are longer than their place, at commas or else at spaces; legends likewise.
+    """Break titles and labels that are longer than their space, at commas or else at spaces; legends likewise.
 
     Numbers get a real minus sign.
     """
@@ -51,7 +51,7 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
     for panel in figure.axes:
         if not panel.get_visible() or panel.name == "3d":
             continue
-        columns, rows = _shares(panel)
+        columns, rows = _fractions(panel)
         _fit_above(panel, BETWEEN_LABELS * width * columns)
         _fit_ticks(panel)
         _break(panel.title, 0.85 * width * columns)
@@ -101,7 +101,7 @@ def thin_ticks(figure: Figure) -> None:
             panel.xaxis.set_major_locator(MaxNLocator(count) if count > 1 else ends)
 
 
-def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | None) -> None:
+def _fit_title(figure: Figure, space: float, *, has_title: bool, lines: int | None) -> None:
     title = figure.get_suptitle()
     doubts = [line for line in title.split("\n") if line.startswith(DOUBT)]
     if not title:
@@ -112,17 +112,17 @@ def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | Non
         text.set_in_layout(bool(doubts))
         title = text.get_text()
     if lines is None:
-        _break(text, room)
+        _break(text, space)
         return
     first = title.split("\n")[0]
     line = f"{first.split(':')[0]}: {doubts[0]}" if doubts and has_title else first
     for maximum in range(len(line), SHORTEST, -1):
         text.set_text(shortened(line, maximum))
-        if text.get_window_extent().width <= room:
+        if text.get_window_extent().width <= space:
             return
 
 
-def _fit_above(panel: Axes, room: float) -> None:
+def _fit_above(panel: Axes, space: float) -> None:
     # A legend above its panel has as many entries side by side as fit.
     legend = panel.get_legend()
     if legend is None or legend.get_gid() != ABOVE:
@@ -130,7 +130,7 @@ def _fit_above(panel: Axes, room: float) -> None:
     handles = [handle for handle in legend.legend_handles if handle is not None]
     words = [text.get_text() for text in legend.get_texts()]
     for columns in _fewer_columns(len(words)):
-        if legend.get_window_extent().width <= room:
+        if legend.get_window_extent().width <= space:
             return
         legend = legend_above(panel, columns, handles, words)
 
@@ -162,26 +162,26 @@ def _fit_ticks(panel: Axes) -> None:
 
 
 def _minus_of(words: Callable[..., str]) -> Callable[..., str]:
-    def written(tick: float, place: int | None = None) -> str:
-        return with_minus(words(tick, place))
+    def written(tick: float, index: int | None = None) -> str:
+        return with_minus(words(tick, index))
 
     return written
 
 
-def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
+def _fit_legend(figure: Figure, legend: Legend, space: float) -> None:
     # A legend below the panels has as many entries side by side as fit, then entries on several lines.
     handles = [handle for handle in legend.legend_handles if handle is not None]
     words = [text.get_text() for text in legend.get_texts()]
     where: Literal["lower center", "outside lower center"]
     where = "lower center" if figure.get_layout_engine() is None else "outside lower center"
     for columns in _fewer_columns(len(words)):
-        if legend.get_window_extent().width <= room:
+        if legend.get_window_extent().width <= space:
             return
         legend.remove()
         legend = figure.legend(handles, words, loc=where, ncols=columns)
     beside = legend.get_window_extent().width - max(text.get_window_extent().width for text in legend.get_texts())
     for text in legend.get_texts():
-        _break(text, room - beside)
+        _break(text, space - beside)
 
 
 def _fewer_columns(count: int) -> list[int]:
@@ -189,17 +189,17 @@ def _fewer_columns(count: int) -> list[int]:
     return list(dict.fromkeys(-(-count // lines) for lines in range(2, count + 1)))
 
 
-def _shares(panel: Axes) -> tuple[float, float]:
-    # Return a panel's shares of the picture's width and height; a colour bar beside several panels has no place in
+def _fractions(panel: Axes) -> tuple[float, float]:
+    # Return a panel's fractions of the picture's width and height; a colour bar beside several panels has no slot in
     # their grid.
-    place = panel.get_subplotspec()
-    if place is None:
+    spec = panel.get_subplotspec()
+    if spec is None:
         return 1.0, 1.0
-    grid = place.get_gridspec()
-    return len(place.colspan) / grid.ncols, len(place.rowspan) / grid.nrows
+    grid = spec.get_gridspec()
+    return len(spec.colspan) / grid.ncols, len(spec.rowspan) / grid.nrows
 
 
-def _break(text: Text, room: float, *, upright: bool = False) -> None:
+def _break(text: Text, space: float, *, upright: bool = False) -> None:
     original = text.get_text()
     if not original.strip():
         return
@@ -207,7 +207,7 @@ def _break(text: Text, room: float, *, upright: bool = False) -> None:
     def fits(line: str) -> bool:
         text.set_text(line)
         extent = text.get_window_extent()
-        return (extent.height if upright else extent.width) <= room
+        return (extent.height if upright else extent.width) <= space
 
     lines = []
     for line in original.split("\n"):

@@ -31,10 +31,10 @@ def starts_at_rest(result: Result, name: str) -> bool:
 
 def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:
     """Constants of a picture of a map, in words."""
-    place = start(result)
+    origin = start(result)
     phrases = []
-    if place:
-        phrases.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
+    if origin:
+        phrases.append(f"from ({', '.join(f'{number:.4g}' for number in origin.values())}) m")
     elif name and starts_at_rest(result, name):
         phrases.append("from rest")
     phrases += fixed

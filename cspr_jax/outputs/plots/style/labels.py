@@ -127,6 +127,6 @@ def values(result: Result, axis: str, points: Float[np.ndarray, "n"]) -> list[st
     return texts
 
 
-def chosen(count: int, most: int) -> np.ndarray:
+def chosen(count: int, maximum: int) -> np.ndarray:
     """Evenly chosen points of many."""
-    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+    return np.unique(np.linspace(0, count - 1, min(maximum, count)).round().astype(int))

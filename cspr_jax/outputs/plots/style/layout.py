@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.style.labels import principal_angle
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
-# Least width of a panel, inches, with its share of labels and colour bar.
+# Smallest width of a panel, inches, with its part of labels and colour bar.
 LEAST_WIDTH = 1.6
 # Below this width, cm, a picture is that of a column: its title has one line, its bars lie below the panels.
 NARROW, INCH = 12.0, 2.54
@@ -26,8 +26,8 @@ def is_narrow() -> bool:
 
 def columns_of(count: int) -> int:
     """Number of panels side by side in a picture of the width that `in_style` has set."""
-    room = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
-    return min(room, 2 if count == 4 else min(3, count))
+    possible = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
+    return min(possible, 2 if count == 4 else min(3, count))
 
 
 def panels(
@@ -61,16 +61,16 @@ def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
-def reach_polar(axes: list[Axes], reach: float, unit: str) -> None:
+def set_polar_ticks(axes: list[Axes], radius: float, unit: str) -> None:
     """Ticks around and outward."""
-    step = next((step for step in DEGREES if reach <= 4.5 * step), None)
+    step = next((step for step in DEGREES if radius <= 4.5 * step), None)
     even = step is None or unit != "°"
-    all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
-    ticks = all_ticks[(all_ticks > 0.0) & (all_ticks < 0.95 * reach)]
+    all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, radius)) if even else np.arange(0.0, radius, step)
+    ticks = all_ticks[(all_ticks > 0.0) & (all_ticks < 0.95 * radius)]
     around = range(0, 360, 45)
     gap = " " if unit.isalpha() else ""
     for panel in axes:
-        panel.set_ylim(0.0, reach)
+        panel.set_ylim(0.0, radius)
         panel.set_yticks(ticks, labels=[""] * len(ticks))
         panel.set_xticks(
             [math.radians(angle) for angle in around], labels=[f"{principal_angle(angle):g}°" for angle in around]

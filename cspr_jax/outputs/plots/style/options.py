@@ -52,7 +52,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     )
     add_motion_plan(parser)
     parser.set_defaults(device=None)
-    add_look(parser)
+    add_style(parser)
 
 
 def add_best(parser: argparse.ArgumentParser) -> None:
@@ -76,7 +76,7 @@ def add_motion_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--z-axis", choices=("up", "down"), help="or only where z points in a motion in CSV")
 
 
-def add_look(parser: argparse.ArgumentParser) -> None:
+def add_style(parser: argparse.ArgumentParser) -> None:
     """Arguments of every picture; `style.style_of` reads them."""
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="size of the picture, cm, such as 16x10")
     presets = parser.add_mutually_exclusive_group()

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
-# Room around the drawn points, over their size.
-ROOM = 0.04
+# Margin around the drawn points, over their size.
+MARGIN = 0.04
 # Ticks of an axis at most, and steps that make a picture fit.
 MOST_TICKS, LEAST_TICKS, STEPS = 5, 2, 4
-FILLS = "fills its place"
+FILLS = "fills its slot"
 
 
 def colours_of_tension() -> ListedColormap:
@@ -31,13 +31,13 @@ def colours_of_tension() -> ListedColormap:
 
 
 def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) -> None:
-    """Axes of true proportions, seen from the side with z upward in the picture; `fill_places` makes them large."""
+    """Axes of true proportions, seen from the side with z upward in the picture; `fill_panels` makes them large."""
     low, high = points.min(0), points.max(0)
-    size = np.maximum(high - low, 0.1 * (high - low).max())
+    extents = np.maximum(high - low, 0.1 * (high - low).max())
     middle = 0.5 * (low + high)
     signs = signs_of(is_down=is_down)
     for k, name in enumerate("xyz"):
-        half = (0.5 + ROOM) * signs[k] * size[k]
+        half = (0.5 + MARGIN) * signs[k] * extents[k]
         panel.set(**{f"{name}lim": (middle[k] - half, middle[k] + half), f"{name}label": f"{name} (m)"})
         axis = getattr(panel, f"{name}axis")
         # A label that is turned by matplotlib may stand on its head.
@@ -45,10 +45,10 @@ def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) ->
         axis.label.set_rotation(90.0 if name == "z" else 0.0)
         axis.labelpad = rcParams["font.size"] * (0.4 if name == "z" else 1.8)
         axis.set_in_layout(False)
-    panel.set_box_aspect(tuple(size))
+    panel.set_box_aspect(tuple(extents))
     panel.set_proj_type("ortho")
     panel.view_init(elev=ELEVATION, azim=AZIMUTH)
-    # The square of the panel is larger than its place, and lies over its neighbours.
+    # The square of the panel is larger than its slot, and lies over its neighbours.
     panel.patch.set_visible(False)
     panel.set_gid(FILLS)
 
@@ -83,19 +83,19 @@ def shape_of(points: Float[np.ndarray, "n 3"]) -> float:
     return float((up * np.cos(elevation) + level * np.sin(elevation)) / across)
 
 
-def fill_places(figure: Figure) -> None:
-    """Make each robot in space as large as its place allows, with as many ticks as do not overlap."""
+def fill_panels(figure: Figure) -> None:
+    """Make each robot in space as large as its slot allows, with as many ticks as do not overlap."""
     spaces: list[Any] = [panel for panel in figure.axes if panel.get_gid() == FILLS]
     if not spaces:
         return
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for panel in spaces:
-        place = panel.get_position(original=True)
+        slot = panel.get_position(original=True)
         for count in range(MOST_TICKS, 1, -1):
             for axis in _axes(panel):
                 axis.set_major_locator(MaxNLocator(count, prune="both"))
-            _fill(figure, panel, place)
+            _fill(figure, panel, slot)
             if not _meet(panel):
                 break
         _add_ticks(figure, panel)
@@ -104,12 +104,12 @@ def fill_places(figure: Figure) -> None:
             # Two numbers show a scale: rather leave out single ones of many.
             for axis in _axes(panel):
                 axis.set_major_locator(MaxNLocator(MOST_TICKS, prune="both"))
-            _fill(figure, panel, place)
+            _fill(figure, panel, slot)
             _leave_out(panel)
 
 
 def _add_ticks(figure: Figure, panel: Any) -> None:
-    # Axes that have room for more ticks than the others get them.
+    # Axes that have space for more ticks than the others get them.
     for axis in _axes(panel):
         usual = axis.get_major_locator()
         for count in range(2 * MOST_TICKS, LEAST_TICKS, -2):
@@ -125,12 +125,12 @@ def _add_ticks(figure: Figure, panel: Any) -> None:
     _place_words(figure, panel)
 
 
-def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
+def _fill(figure: Figure, panel: Any, slot: Bbox) -> None:
     # Letters keep their size when the box grows: a few steps.
     width, height = figure.get_size_inches()
-    side = max(place.width * width, place.height * height)
-    room = TransformedBbox(place, figure.transSubfigure)
-    middle, zoom = np.array([0.5 * (place.x0 + place.x1), 0.5 * (place.y0 + place.y1)]), 1.0
+    side = max(slot.width * width, slot.height * height)
+    space = TransformedBbox(slot, figure.transSubfigure)
+    middle, zoom = np.array([0.5 * (slot.x0 + slot.x1), 0.5 * (slot.y0 + slot.y1)]), 1.0
     sizes = tuple(abs(high - low) for low, high in (panel.get_xlim(), panel.get_ylim(), panel.get_zlim()))
     half = 0.5 * side / np.array([width, height])
     for _ in range(STEPS):
@@ -138,8 +138,8 @@ def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
         panel.set_box_aspect(sizes, zoom=zoom)
         _place_words(figure, panel)
         drawn = Bbox.union([*words_in_space(panel), box_in_space(panel)])
-        zoom *= float(min(room.width / drawn.width, room.height / drawn.height))
-        shift = np.array([room.x0 + room.x1 - drawn.x0 - drawn.x1, room.y0 + room.y1 - drawn.y0 - drawn.y1])
+        zoom *= float(min(space.width / drawn.width, space.height / drawn.height))
+        shift = np.array([space.x0 + space.x1 - drawn.x0 - drawn.x1, space.y0 + space.y1 - drawn.y0 - drawn.y1])
         middle = middle + 0.5 * shift / np.array([figure.bbox.width, figure.bbox.height])
 
 
@@ -176,15 +176,15 @@ def words_in_space(panel: Any) -> list[Bbox]:
 
 def _leave_out(panel: Any) -> None:
     # Even among few ticks, leave out those whose numbers would meet others: an axis may be seen nearly from its end.
-    taken = [axis.label.get_window_extent() for axis in _axes(panel)]
+    boxes = [axis.label.get_window_extent() for axis in _axes(panel)]
     for axis in _axes(panel):
-        places = []
+        locations = []
         for tick in axis.get_major_ticks():
             box = tick.label1.get_window_extent()
-            if tick.label1.get_text() and not any(box.padded(1.0).overlaps(other) for other in taken):
-                places.append(tick.get_loc())
-                taken.append(box)
-        axis.set_major_locator(FixedLocator(places))
+            if tick.label1.get_text() and not any(box.padded(1.0).overlaps(other) for other in boxes):
+                locations.append(tick.get_loc())
+                boxes.append(box)
+        axis.set_major_locator(FixedLocator(locations))
 
 
 def _meet(panel: Any) -> bool:

@@ -17,11 +17,11 @@ from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.style.fitting import fit, share_of_panels, thin_ticks
 from cspr_jax.outputs.plots.style.layout import INCH, NARROW
 from cspr_jax.outputs.plots.style.options import USUAL, WIDTHS
-from cspr_jax.outputs.plots.style.scene import fill_places
+from cspr_jax.outputs.plots.style.scene import fill_panels
 
 # Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
 # text in SVG, and a dollar sign in a name is no mathematics. Sizes of letters are relative to font.size.
-LOOK = {
+RC_PARAMS = {
     "text.parse_math": False,
     "axes.formatter.useoffset": False,
     "axes.unicode_minus": True,
@@ -45,7 +45,7 @@ SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
 # Letters of pictures for papers, points; their heights follow from their content.
 PRESETS = {"column": 8.0, "page": 9.0}
 UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
-# Panels take at least this share of the height; where they have less the picture gets higher, at most so often.
+# Panels take at least this fraction of the height; where they have less the picture gets higher, at most so often.
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
 # Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
 SMALLER, LEAST_LETTERS = 0.92, 5.0
@@ -130,11 +130,11 @@ def _bounded(key: str, value: float, bounds: tuple[float, float]) -> float:
 @contextmanager
 def in_style(style: Style) -> Iterator[None]:
     """Make figures look alike, whatever the user's matplotlib is set to."""
-    look = LOOK | {"font.size": style.font_size}
+    params = RC_PARAMS | {"font.size": style.font_size}
     width = style.size[0] if style.size is not None else style.width
     if width is not None:
-        look["figure.figsize"] = (width / INCH, width / INCH)
-    with matplotlib.style.context(["default", look]):
+        params["figure.figsize"] = (width / INCH, width / INCH)
+    with matplotlib.style.context(["default", params]):
         yield
 
 
@@ -156,13 +156,13 @@ def laid_out(figure: Figure, style: Style) -> None:
         raise InputError("--dpi", style.dpi, f"at most {maximum} for {width * INCH:.3g}x{height * INCH:.3g} cm")
     with _no_missing_letters():
         fit(figure, has_title=style.has_title, lines=1 if width * INCH < NARROW else None)
-        _give_room(figure, style)
+        _enlarge_panels(figure, style)
         thin_ticks(figure)
-        fill_places(figure)
+        fill_panels(figure)
 
 
-def _give_room(figure: Figure, style: Style) -> None:
-    # Panels take their share of the height in a narrow picture, or one of the default height.
+def _enlarge_panels(figure: Figure, style: Style) -> None:
+    # Panels take their fraction of the height in a narrow picture, or one of the default height.
     if figure.get_layout_engine() is None or (style.width is None and figure.get_figwidth() * INCH >= NARROW):
         return
     letters, before = style.font_size, -1.0
@@ -170,7 +170,7 @@ def _give_room(figure: Figure, style: Style) -> None:
         with warnings.catch_warnings(record=True) as caught:
             warnings.filterwarnings("always", "constrained_layout not applied")
             figure.draw_without_rendering()
-        # Panels without room stay where they were.
+        # Panels without space stay where they were.
         fraction = 0.0 if caught else share_of_panels(figure)
         if fraction >= LEAST_SHARE:
             return
@@ -187,7 +187,7 @@ def _give_room(figure: Figure, style: Style) -> None:
             for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
                 for words in axis.get_ticklabels()[:1]:
                     axis.set_tick_params(labelsize=SMALLER * float(words.get_fontsize()))
-    # A picture without room for its panels is refused where it is written.
+    # A picture without space for its panels is refused where it is written.
 
 
 def rendered(figure: Figure, ending: str, style: Style) -> bytes:
@@ -199,8 +199,10 @@ def rendered(figure: Figure, ending: str, style: Style) -> bytes:
             figure.savefig(content, format=ending[1:], dpi=style.dpi, metadata=METADATA.get(ending))
         except UserWarning as warning:
             width, height = figure.get_size_inches()
-            size = f"{width * INCH:.3g}x{height * INCH:.3g}"
-            raise InputError("--size", size, "larger, or --font-size smaller: the texts leave no room") from warning
+            dimensions = f"{width * INCH:.3g}x{height * INCH:.3g}"
+            raise InputError(
+                "--size", dimensions, "larger, or --font-size smaller: the texts leave no room"
+            ) from warning
     return content.getvalue()
 
 

@@ -1,4 +1,4 @@
-"""Surroundings of a process of the command line: settings of other libraries, and how many threads it may have."""
+"""Environment of a process of the command line: settings of other libraries, and how many threads it may have."""
 
 import contextlib
 import errno
@@ -22,7 +22,7 @@ FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
 # its threads mostly wait for work, and do so busily: they would take a fifth of the processor time of a plan.
 OF_OPENBLAS, OF_ALL_LIBRARIES = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"
 # Address space below which jax does not compile a plan on two cores, bytes.
-LEAST_MEMORY = 2_000_000_000
+SMALLEST_MEMORY = 2_000_000_000
 _SMALL_STACK = 1 << 16  # bytes
 _LARGER = "or the limit of a container or a job, must be larger"
 _THREADS = f"no more threads can be started: `ulimit -u`, {_LARGER}"
@@ -32,7 +32,7 @@ _NO_MEMORY = ("RESOURCE_EXHAUSTED", "failed to map segment", "annot allocate mem
 _MEMORY = f"memory does not suffice: `ulimit -v`, {_LARGER}"
 
 
-def settle() -> None:
+def configure() -> None:
     """Keep settings that others made for their own programs from this process and those that it starts.
 
     The command line opens no window, and its pictures do not depend on matplotlib's settings.
@@ -93,31 +93,32 @@ def check_matplotlibrc() -> None:
     locale.setlocale(locale.LC_ALL, before)
 
 
-def check_threads(count: int = 0) -> None:
-    """Refuse to begin where libraries could not start threads: they would end the process, or send it a Ctrl-C."""
+def check_threads(processes: int | None = None) -> None:
+    """Refuse to begin where libraries could not start threads: they would end the process, or send it a Ctrl-C.
+
+    With a number of processes, those of jax are counted too, in this process or in so many workers; and memory must
+    suffice for what jax compiles, since LLVM would end the process.
+    """
+    count = FEW + cores()
+    if processes is not None:
+        maximum = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if 0 <= maximum < SMALLEST_MEMORY:
+            raise ResourceError(_MEMORY)
+        count += (OF_JAX + FEW) * max(processes, 1) + OF_JAX_PER_CORE * max(cores(), processes)
     over, started = threading.Event(), list[threading.Thread]()
-    size = threading.stack_size(_SMALL_STACK)
+    stack_size = threading.stack_size(_SMALL_STACK)
     try:
-        for _ in range(FEW + cores() + count):
+        for _ in range(count):
             thread = threading.Thread(target=over.wait, daemon=True)
             thread.start()
             started.append(thread)
     except RuntimeError as error:
         raise ResourceError(_THREADS) from error
     finally:
-        threading.stack_size(size)
+        threading.stack_size(stack_size)
         over.set()
         for thread in started:
             thread.join()
-
-
-def check_threads_of_jax(processes: int = 0) -> None:
-    """Refuse to begin where jax could not start its threads, or map what it compiles: LLVM would end the process."""
-    maximum = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if 0 <= maximum < LEAST_MEMORY:
-        raise ResourceError(_MEMORY)
-    if processes or "jax" not in sys.modules:
-        check_threads((OF_JAX + FEW) * max(processes, 1) + OF_JAX_PER_CORE * max(cores(), processes))
 
 
 def shortage(error: Exception) -> str | None:
