@@ -11,6 +11,7 @@ from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdi
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
 from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers
@@ -44,11 +45,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "tension_min": float(peaks.tension_min[0]),
         "tension_max": float(peaks.tension_max[0]),
         "tension_margin": float(answers.margin[0]) if plan.is_redundant else None,
-        "cable_length_max": float(peaks.length_max[0]),
-        "cable_speed_max": float(peaks.speed_max[0]),
-        "cable_acceleration_max": float(peaks.acceleration_max[0]),
-        "speed_max": float(peaks.mass_centre_speed[0]),
-        "acceleration_max": float(peaks.mass_centre_acceleration[0]),
+        **{row.name: float(getattr(peaks, row.peak)[0]) for row in LIMITS if row.peak},
         "z_lowest": float(peaks.lowest[0]),
         "demands": {CRITERIA[flag][0]: row for flag, row in _peaks(plan, case).items()},
         "point": plan.point if plan.robot_file.is_platform else None,
@@ -101,10 +98,8 @@ def _sampled_peaks(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
     if plan.is_redundant:
         low, high = tension_range(plan.problem.robot, plan.problem.limits)
         rows |= {Verdict.SLACK_CABLE: ("tension_min", "N", low), Verdict.OVER_TENSION: ("tension_max", "N", high)}
-    if plan.problem.limits.speed_max is None:
-        rows[Verdict.TOO_FAST] = ("mass_centre_speed", "m/s", None)
-    if plan.problem.limits.acceleration_max is None:
-        rows[Verdict.OVER_ACCELERATION] = ("mass_centre_acceleration", "m/s^2", None)
+    free = (row for row in LIMITS if row.of_mass_centre and getattr(plan.problem.limits, row.name) is None)
+    rows |= {row.flag: (row.peak, row.unit, None) for row in free}
     table, count = {}, plan.problem.robot.n_cables
     for flag, (name, unit, allowed) in rows.items():
         cable = int(peaks.cables[0, EXTREMES.index(name)])

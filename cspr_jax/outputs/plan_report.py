@@ -10,6 +10,7 @@ from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -110,11 +111,7 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(peaks.lowest[i]),
-        "cable_length_max": float(peaks.length_max[i]),
-        "cable_speed_max": float(peaks.speed_max[i]),
-        "cable_acceleration_max": float(peaks.acceleration_max[i]),
-        "speed_max": float(peaks.mass_centre_speed[i]),
-        "acceleration_max": float(peaks.mass_centre_acceleration[i]),
+        **{row.name: float(getattr(peaks, row.peak)[i]) for row in LIMITS if row.peak},
         "samples": int(peaks.samples[i]),
     }
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i) | {"margin_unit": plan.margin_unit(i)}

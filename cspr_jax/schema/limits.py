@@ -1,7 +1,7 @@
 """Limits beyond taut cables: one row each. No jax here: files and tables use them too."""
 
 import dataclasses
-from typing import Literal
+from typing import Any, Literal
 
 from cspr_jax.schema.verdicts import Verdict
 
@@ -56,6 +56,11 @@ class Limit:
         of_motion: whether the quantity depends on how the effector moves, not only on where it is.
         from_zero: whether 0 is allowed, besides positive values; ignored for coordinates.
         description: for the reference.
+        legend: words of its colour in maps.
+        colour: of cells that break it.
+        chart: chart of a motion that shows where it is broken; "": that of the path.
+        peak: field of `motion.peaks.Peaks` that reports give under the name of the limit; "": none.
+        seconds: time that its proof takes in a cell with 30 arcs, before what `CellCost` says of a kind of map.
     """
 
     name: str
@@ -67,6 +72,11 @@ class Limit:
     of_motion: bool
     from_zero: bool
     description: str
+    legend: str
+    colour: str
+    chart: str = ""
+    peak: str = ""
+    seconds: float = 6e-3
 
     @property
     def allowed(self) -> str:
@@ -83,25 +93,76 @@ class Limit:
         """Tell whether it bounds how fast the mass centre moves."""
         return self.quantity.startswith("mass_centre")
 
-
-def _of_mass_centre(name: str, flag: Verdict, quantity: str, unit: str) -> Limit:
-    words = f"largest {quantity} of the mass centre"
-    return Limit(name, flag, "most", f"mass_centre_{quantity}", unit, False, True, False, words)
-
-
-def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion: bool) -> Limit:
-    return Limit(name, flag, "most", quantity, unit, True, of_motion, False, f"largest cable {quantity}")
+    @property
+    def extreme(self) -> str:
+        """Peak of the quantity, in words, for the reference."""
+        quantity = self.quantity.removeprefix("mass_centre_")
+        return f"{SENSES[self.sense]} {quantity} of {'any cable' if self.per_cable else 'the mass centre'}."
 
 
+SENSES = {"least": "Smallest", "most": "Largest"}
 FLOOR = "z of the floor, which no point of the effector passes: mass centre, attachment points, shape if it is given"
+
+
+def _of_tension(name: str, flag: Verdict, words: str, sense: Literal["least", "most"], **more: Any) -> Limit:
+    is_least = sense == "least"
+    return Limit(name, flag, sense, "tension", "N", True, True, is_least, words, chart="tension", seconds=5e-4, **more)
+
+
+def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion: bool, **more: Any) -> Limit:
+    words, peak = f"largest cable {quantity}", f"{quantity}_max"
+    return Limit(name, flag, "most", quantity, unit, True, of_motion, False, words, peak=peak, **more)
+
+
+def _of_mass_centre(name: str, flag: Verdict, quantity: str, unit: str, **more: Any) -> Limit:
+    words, peak = f"largest {quantity} of the mass centre", f"mass_centre_{quantity}"
+    return Limit(name, flag, "most", peak, unit, False, True, False, words, peak=peak, **more)
+
+
 # In the order of their slacks. The floor is z in the axes of a file, and a depth in the kernels': at most so deep.
 LIMITS = (
-    Limit("tension_min", Verdict.SLACK_CABLE, "least", "tension", "N", True, True, True, "smallest tension"),
-    Limit("tension_max", Verdict.OVER_TENSION, "most", "tension", "N", True, True, False, "largest tension"),
-    Limit("floor", Verdict.BELOW_FLOOR, "most", "depth", "m", False, False, True, FLOOR),
-    _of_cables("cable_length_max", Verdict.CABLE_TOO_LONG, "length", "m", of_motion=False),
-    _of_cables("cable_speed_max", Verdict.CABLE_TOO_FAST, "speed", "m/s", of_motion=True),
-    _of_cables("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, "acceleration", "m/s^2", of_motion=True),
-    _of_mass_centre("speed_max", Verdict.TOO_FAST, "speed", "m/s"),
-    _of_mass_centre("acceleration_max", Verdict.OVER_ACCELERATION, "acceleration", "m/s^2"),
+    _of_tension(
+        "tension_min", Verdict.SLACK_CABLE, "smallest tension", "least", legend="slack cable", colour="#56B4E9"
+    ),
+    _of_tension(
+        "tension_max", Verdict.OVER_TENSION, "largest tension", "most", legend="too much tension", colour="#0072B2"
+    ),
+    Limit(
+        *("floor", Verdict.BELOW_FLOOR, "most", "depth", "m", False, False, True, FLOOR),
+        legend="below the floor",
+        colour="#6f6f6f",
+        seconds=2e-4,
+    ),
+    _of_cables(
+        *("cable_length_max", Verdict.CABLE_TOO_LONG, "length", "m"),
+        of_motion=False,
+        legend="cable too long",
+        colour="#8c6d31",
+        chart="length",
+        seconds=3e-4,
+    ),
+    _of_cables(
+        *("cable_speed_max", Verdict.CABLE_TOO_FAST, "speed", "m/s"),
+        of_motion=True,
+        legend="cable too fast",
+        colour="#7b4173",
+        chart="rate",
+    ),
+    _of_cables(
+        *("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, "acceleration", "m/s^2"),
+        of_motion=True,
+        legend="cable acceleration",
+        colour="#bd9e39",
+        chart="rate",
+        seconds=2e-3,
+    ),
+    _of_mass_centre(
+        *("speed_max", Verdict.TOO_FAST, "speed", "m/s"), legend="too fast", colour="#A05195", chart="velocity"
+    ),
+    _of_mass_centre(
+        *("acceleration_max", Verdict.OVER_ACCELERATION, "acceleration", "m/s^2"),
+        legend="acceleration",
+        colour="#D9B44A",
+        chart="acceleration",
+    ),
 )

@@ -1,5 +1,7 @@
 """Fields of the object that `cspr plan --json` prints, with units and meanings; the reference is written from here."""
 
+from cspr_jax.schema.limits import LIMITS
+
 _POINT = '"mass-centre" or "origin": point of the platform whose poses files hold; null of a point mass.'
 # Fields that --rate adds.
 _ROWS = {
@@ -13,11 +15,7 @@ _ROWS = {
 }
 # Fields of segments and of checks.
 _EXTREMES = {
-    "cable_length_max": ("m", "Largest length of any cable."),
-    "cable_speed_max": ("m s-1", "Largest speed of any cable."),
-    "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable."),
-    "speed_max": ("m s-1", "Largest speed of the mass centre."),
-    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre."),
+    **{row.name: (row.unit.replace("/s", " s-1").replace("-1^", "-"), row.extreme) for row in LIMITS if row.peak},
     "z_lowest": ("m", "z of the lowest point, of all of a platform: mass centre, attachment points, shape."),
 }
 PLAN_OBJECT = {

@@ -16,15 +16,7 @@ TILE_SECONDS = 40.0
 # A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and a
 # tile of a platform's poses takes half a second whatever it holds.
 FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
-# Seconds that proofs of limits take a cell with 30 arcs, before what `CellCost` says of a kind of map.
-LIMIT_SECONDS = {
-    "tension_min": 5e-4,
-    "tension_max": 5e-4,
-    "floor": 2e-4,
-    "cable_length_max": 3e-4,
-    "cable_speed_max": 6e-3,
-    "cable_acceleration_max": 2e-3,
-}
+# Seconds that uncertainty takes a cell with 30 arcs, before what `CellCost` says of a kind of map.
 UNCERTAINTY_SECONDS = 1e-2
 # Likewise for a workspace, by what else is computed for each cell.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
@@ -35,8 +27,7 @@ ARCS = 30
 
 def cell_seconds(kind: MapKind, spec: SweepFile) -> float:
     """Estimate the time that a cell takes on one core."""
-    names = [limit.name for limit in LIMITS if is_given(spec, f"limits.{limit.name}")]
-    limits = kind.cost.limits * sum(LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names)
+    limits = kind.cost.limits * sum(limit.seconds for limit in LIMITS if is_given(spec, f"limits.{limit.name}"))
     if is_given(spec, "limits.uncertainty"):
         limits += kind.cost.uncertainty * UNCERTAINTY_SECONDS
     conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(spec, f"workspace.{name}"))

@@ -21,6 +21,7 @@ from cspr_jax.outputs.plots.robots.robot_along import limits_of
 from cspr_jax.outputs.plots.style.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import PARTS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
@@ -30,13 +31,10 @@ if TYPE_CHECKING:
 
 # By the quantity that a chart shows: the criteria that it shows. Those that no chart of a figure shows are in its chart
 # of the path, or of the tensions.
-SHOWN = {
-    "tension": Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE | Verdict.UNCERTAINTY,
-    "rate": Verdict.CABLE_TOO_FAST | Verdict.CABLE_OVER_ACCELERATION,
-    "length": Verdict.CABLE_TOO_LONG,
-    "velocity": Verdict.TOO_FAST | Verdict.OVER_FEED,
-    "acceleration": Verdict.OVER_ACCELERATION,
-}
+SHOWN = {"tension": Verdict.WRENCH_INFEASIBLE | Verdict.UNCERTAINTY, "velocity": Verdict.OVER_FEED}
+for _limit in LIMITS:
+    if _limit.chart:
+        SHOWN[_limit.chart] = SHOWN.get(_limit.chart, Verdict.FEASIBLE) | _limit.flag
 # In longer plans the lines would hide the rest.
 BOUNDARIES = 200
 # Fraction of the distance between spools that typed digits may leave between points of one plane.

@@ -10,6 +10,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 
 from cspr_jax.outputs.plots.style.colours import NONE_COLOUR, Scale
 from cspr_jax.outputs.plots.style.labels import COLOURS
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
@@ -18,24 +19,19 @@ from cspr_jax.store.reading.result import Result
 if TYPE_CHECKING:
     from jaxtyping import Int
 
+OF_LIMITS = {limit.flag: (limit.legend, limit.colour) for limit in LIMITS}
 # Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
 # Ito's, and greys.
 REASONS = {
     Verdict.NOT_ACCESSIBLE: ("not accessible", "#f4f4f4"),
     Verdict.ABOVE_SPOOLS: ("above the spools", "#9e9e9e"),
-    Verdict.BELOW_FLOOR: ("below the floor", "#6f6f6f"),
+    Verdict.BELOW_FLOOR: OF_LIMITS[Verdict.BELOW_FLOOR],
     Verdict.SINGULAR: ("singular", "#D55E00"),
     Verdict.CABLE_CABLE: ("cables touch", "#CC79A7"),
     Verdict.CABLE_PLATFORM: ("cable touches platform", "#E69F00"),
     Verdict.OBSTACLE: ("obstacle touched", "#A6761D"),
     Verdict.WRENCH_INFEASIBLE: ("wrench infeasible", "#882255"),
-    Verdict.SLACK_CABLE: ("slack cable", "#56B4E9"),
-    Verdict.OVER_TENSION: ("too much tension", "#0072B2"),
-    Verdict.CABLE_TOO_LONG: ("cable too long", "#8c6d31"),
-    Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
-    Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
-    Verdict.TOO_FAST: ("too fast", "#A05195"),
-    Verdict.OVER_ACCELERATION: ("acceleration", "#D9B44A"),
+    **OF_LIMITS,
     Verdict.OVER_FEED: ("feed", "#C77CFF"),
     Verdict.UNCERTAINTY: ("not every robot", "#B3CDE3"),
     Verdict.UNDECIDED: ("undecided", "#F0E442"),
