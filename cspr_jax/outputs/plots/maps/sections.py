@@ -37,7 +37,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+    from jaxtyping import Float, Num
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
@@ -75,7 +75,7 @@ class PlaneSection(NamedTuple):
 def section_figure(
     result: Result,
     section: PlaneSection,
-    data: Int[np.ndarray, "n_first n_second n_panels"],
+    data: Num[np.ndarray, "n_first n_second n_panels"],
     informative: np.ndarray | None = None,
 ) -> Figure:
     """Sections of a map, one in each panel."""

@@ -16,7 +16,7 @@ from cspr_jax import __version__
 from cspr_jax.errors import InputError
 
 if TYPE_CHECKING:
-    from jaxtyping import Int
+    from jaxtyping import Num
 
 # Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
@@ -50,7 +50,7 @@ def _part(name: str) -> str:
     return (files(__package__) / name).read_text("utf-8")
 
 
-def packed(values: Int[np.ndarray, "..."]) -> dict[str, Any]:
+def packed(values: Num[np.ndarray, "..."]) -> dict[str, Any]:
     """Values for a page."""
     values = np.asarray(values)
     if values.dtype.kind == "f":
@@ -64,7 +64,7 @@ def packed(values: Int[np.ndarray, "..."]) -> dict[str, Any]:
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 
 
-def unpacked(array: dict[str, Any]) -> Int[np.ndarray, "n"]:
+def unpacked(array: dict[str, Any]) -> Num[np.ndarray, "n"]:
     """Values of a page, as a browser has them."""
     name = next(name for name, other in TYPES.items() if other == array["type"])
     data = gzip.decompress(base64.b64decode(array["data"]))

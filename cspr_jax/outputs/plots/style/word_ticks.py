@@ -17,7 +17,7 @@ from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Int
+    from jaxtyping import Num
 
 OF_LIMITS = {limit.flag: (limit.legend, limit.colour) for limit in LIMITS}
 # Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
@@ -42,7 +42,7 @@ FEASIBLE_COLOUR = "#009E73"
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
-def worded(result: Result, name: str, values: Int[np.ndarray, "..."]) -> tuple[np.ndarray, list[str], list[str]] | None:
+def worded(result: Result, name: str, values: Num[np.ndarray, "..."]) -> tuple[np.ndarray, list[str], list[str]] | None:
     """Words that the values of a quantity stand for."""
     quantity = quantity_of(result.attributes.get("map"), name)
     if quantity.unflagged:
