@@ -237,6 +237,7 @@ def test_bounds_of_the_release_are_kept(tmp_path):
         assert (values >= low - 1e-12).all() and (values <= high + 1e-12).all()
 
 
+@pytest.mark.thorough
 def test_its_picture(tmp_path, figures):
     mapped(tmp_path / "one", x=[0.0, 0.3], y=[0.0, 0.5])
     path = tmp_path / "one" / "run" / "s.h5"

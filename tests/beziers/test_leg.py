@@ -68,6 +68,7 @@ def test_one_segment_after_the_other(tmp_path):
     assert (code, err) == (0, "") and "taut for T (s)" in out and "∞" in out and "cables 1-2, 3-4, 5-6" in out
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "limit",
     [

@@ -122,6 +122,7 @@ def test_a_line_beside_a_spool(height):
     assert largest(found.duration[0]) <= limit < largest(found.duration[0] * (1.0 - 1e-3))
 
 
+@pytest.mark.thorough
 def test_rest_that_breaks_a_limit_says_which():
     """Whatever the layout of the spools: it was undecided where they are not in one plane."""
     for spools in (RECTANGLE, [*RECTANGLE[:2], [45, 30, 31], RECTANGLE[3]]):

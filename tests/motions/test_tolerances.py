@@ -104,7 +104,7 @@ def plan_of(tmp_path, capsys, **keys):
     return code, captured.out, captured.err
 
 
-@pytest.mark.quick("hypocycloid-standard-14")
+@pytest.mark.thorough
 @pytest.mark.parametrize(("family", "arcs"), [("hypocycloid-standard", 14), ("transition", 14)])
 def test_a_plan_says_what_it_stands(tmp_path, capsys, family, arcs):
     _, said, _ = plan_of(tmp_path, capsys, family=family, arcs=arcs, spools=0.001)

@@ -77,6 +77,7 @@ def with_arcs(keys: dict, bare) -> dict:
     return {"pose": [keys["pose"][0], keys["pose"][1] | {"arcs": arcs}]} if arcs else {}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", families(MOTIONS))
 def test_motions_that_reach_a_limit_are_feasible(name):
     """At each limit, to rounding; a millionth beyond it they are refused, by this limit alone."""

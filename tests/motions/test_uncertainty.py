@@ -184,6 +184,7 @@ def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
     assert np.median(kept) > 0.8
 
 
+@pytest.mark.thorough
 def test_verdicts_are_those_of_the_multiples():
     limits = Limits(uncertainty=BALLS)
     _, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)

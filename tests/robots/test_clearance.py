@@ -319,6 +319,7 @@ def test_a_room_that_is_turned_and_moved():
     assert np.abs(away.cables - before.cables).max() > 0.05
 
 
+@pytest.mark.thorough
 def test_boxes_that_meet():
     """The platform and a box: apart, and as near as the shadows tell; touching, and in each other."""
     robot, body = platform(), shapes.box([0, 0, 0], [0.8, 0.6, 0.4])
