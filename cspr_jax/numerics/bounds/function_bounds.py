@@ -13,7 +13,7 @@ from cspr_jax.numerics import elementary
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, flat, rounded
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 LARGEST_SINE = 0.9
 
@@ -130,6 +130,6 @@ def magnitude_range(number: AffineBounds) -> tuple[Float[Array, "..."], Float[Ar
     return minimum, jnp.where(jnp.isnan(maximum), jnp.inf, maximum)
 
 
-def changes_sign(number: AffineBounds) -> Float[Array, "..."]:
+def changes_sign(number: AffineBounds) -> Bool[Array, "..."]:
     """Tell whether a number is proved to have opposite signs at both ends of the block."""
     return jnp.abs(number.middle) < jnp.abs(number.linear) - number.radius

@@ -40,7 +40,7 @@ from cspr_jax.robots.contacts.interference_lanes import residual
 from cspr_jax.robots.model.patterns import PATTERNS
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 CORNER_ERROR = 1e-14  # rounding of the corners of shapes, over the extent of a scene
 POLAR = 1e-12  # cosines up to which directions point away from a sector
@@ -70,7 +70,7 @@ def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: 
     return low - allowance, high + allowance
 
 
-def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Float[Array, "n_contacts"]:
+def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Bool[Array, "n_contacts"]:
     """Cables that are proved to pass through each other, or over the platform, within one block."""
     ends, first = _ends(state, cables), bodies.pairs[:, 0]
     through = jax.vmap(_pass)(*(ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2)))

@@ -42,7 +42,7 @@ class TimeBlocks(NamedTuple):
         slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
         return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
 
-    def undecided(self, level: Float[np.ndarray, "n_criteria"]) -> Bool[np.ndarray, "k n_criteria"]:
+    def undecided(self, level: Float[np.ndarray, "..."]) -> Bool[np.ndarray, "k n_criteria"]:
         """Tell which slacks are neither above nor below a level throughout."""
         return ~((self.slacks.low > level) | (self.slacks.high < level))
 

@@ -12,7 +12,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.motion.motion import Motion, states_at
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Samples of a motion among which stops are sought, and the fewest of a smooth part.
 SAMPLES, FEWEST = 2000, 8
@@ -82,7 +82,7 @@ class MotionSequence:
         self._motions, self.size = list(motions), size
         self.duration = np.array([float(motion.duration()) for motion in motions])
 
-    def rates(self, number: Float[np.ndarray, "k"], tau: Float[np.ndarray, "k"]) -> MovingPlaces:
+    def rates(self, number: Int[np.ndarray, "k"], tau: Float[np.ndarray, "k"]) -> MovingPlaces:
         """Places and their derivatives."""
         columns: list[np.ndarray] = []
         for k in np.unique(number).tolist():
@@ -94,7 +94,7 @@ class MotionSequence:
         return MovingPlaces(*columns)
 
     def inside(
-        self, parts: Sequence[SmoothPart], number: Float[np.ndarray, "k"], fraction: Float[np.ndarray, "k"]
+        self, parts: Sequence[SmoothPart], number: Int[np.ndarray, "k"], fraction: Float[np.ndarray, "k"]
     ) -> MovingPlaces:
         """Places and their derivatives within smooth parts."""
         motion, start, end = (np.array([part[i] for part in parts])[number] for i in range(3))
