@@ -12,7 +12,7 @@ from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.columns import Columns
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Bool, Int
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
 
@@ -74,7 +74,7 @@ def joined(parts: list[AnyAnswers]) -> AnyAnswers:
 
 
 def replaced(
-    answers: AnyAnswers, index: Float[np.ndarray, "m"], others: Answers, chosen: Float[np.ndarray, "m"]
+    answers: AnyAnswers, index: Int[np.ndarray, "m"], others: Answers, chosen: Int[np.ndarray, "m"]
 ) -> AnyAnswers:
     """Answers, some of which others replace."""
     columns = {name: np.array(values) for name, values in vars(answers).items()}

@@ -32,7 +32,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved import proved
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 BATCH = 512
 # Samples an arc: of a first look, and of one before a proof.
@@ -146,7 +146,7 @@ def _motion(problem: Problem, segments: Segment, i: int, number: int) -> Hypocyc
 def least_slacks(
     problem: Problem,
     segments: Segment,
-    rows: Float[np.ndarray, "m"],
+    rows: Int[np.ndarray, "m"],
     number: int,
     samples: int,
     *,

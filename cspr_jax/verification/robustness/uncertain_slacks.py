@@ -35,7 +35,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import limit_slacks, tension_slacks
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 STEP = 1e-6  # displacement by which differences are taken, over the length of a cable
 NEAREST = 2  # criteria of which the worst displacements are sought
@@ -231,7 +231,7 @@ def states_fail(
     directions: np.ndarray,
     *,
     contacts_alone: bool = False,
-) -> Float[np.ndarray, "k"]:
+) -> Bool[np.ndarray, "k"]:
     """Tell in which states a robot that is displaced, light or heavy, breaks a criterion."""
     distances = np.repeat(np.stack([radii.spools, radii.centre], axis=1), [robot.n_cables, 1], axis=1)
     moved = np.repeat(distances[:, None, :, None] * directions, 2, axis=1)

@@ -27,7 +27,7 @@ from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, invert
 from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 # Blocks without an enclosure have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
@@ -296,7 +296,7 @@ def fails(
     worst: WorstDisplacements,
     requirements: Requirements,
     multiple: Float[np.ndarray, "k"],
-) -> Float[np.ndarray, "k"]:
+) -> Bool[np.ndarray, "k"]:
     """Tell where a worst robot within a multiple of the uncertainty breaks a criterion in the middle of a block."""
     radii, limits = _radii(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)

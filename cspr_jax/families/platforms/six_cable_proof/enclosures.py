@@ -34,7 +34,7 @@ from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Num
 
 # Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6
@@ -259,7 +259,7 @@ class Robustness:
         requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
         return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), full=full)
 
-    def enclosure(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
+    def enclosure(self, segments: PlatformSegment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
         """Enclosure of blocks of motions."""
         problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
         items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop

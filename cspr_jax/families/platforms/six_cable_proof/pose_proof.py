@@ -32,7 +32,7 @@ from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Bool, Float, Num
 
 # Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
 # where a platform moves fastest.
@@ -111,7 +111,7 @@ class PlaceCertifier:
     def prove(
         self,
         segments: PlatformSegment,
-        arcs: Float[np.ndarray, "n"],
+        arcs: Num[np.ndarray, "n"],
         *,
         margins: bool = False,
         ignored: Bool[np.ndarray, "n_criteria"] | None = None,

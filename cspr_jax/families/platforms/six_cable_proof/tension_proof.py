@@ -42,7 +42,7 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Bool, Float, Num
 
 # Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
 # are narrowed down from the instants of blocks, the number is fixed; for verdicts alone it grows from the first to the
@@ -106,7 +106,7 @@ class Certifier:
     def prove(
         self,
         segments: PlatformSegment,
-        arcs: Float[np.ndarray, "n"],
+        arcs: Num[np.ndarray, "n"],
         *,
         near: float = 0.0,
         margins: bool = False,

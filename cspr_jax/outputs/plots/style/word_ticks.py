@@ -68,7 +68,7 @@ def word_scale(words: list[str], colours: list[str]) -> Scale:
     return Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))
 
 
-def reasons(verdicts: Int[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
+def reasons(verdicts: Num[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
     """Verdicts as numbers of reasons."""
     flags = verdicts.astype(int) & ~NO_REASON.value
     numbers = np.zeros(flags.shape, int)
