@@ -1,4 +1,4 @@
-"""Table 3.3 for one amplitude function, from a cold start: seconds, and motions and instants against testing all."""
+"""Table 3.3 for one amplitude function, from a cold start: seconds, and motions and samples against testing all."""
 
 import argparse
 import time
@@ -36,9 +36,9 @@ def main() -> None:
     arcs = 0.5 * (tables.MAX_ARCS + 1)
     every = motions * arcs * (PARTS * (STEPS + 1) + WITH_MARGINS[0] * (DEGREE + 1))
     done = checker.done
-    instants = done["sieve"] + done["checks"]
+    samples = done["screen"] + done["checks"]
     print(f"motions: {motions:,} candidates, {done['motions']:,} checked in full ({done['motions'] / motions:.2%})")
-    print(f"instants: {every:,.0f} if all were, {instants:,} done ({instants / every:.2%}): {done}")
+    print(f"samples: {every:,.0f} if all were, {samples:,} done ({samples / every:.2%}): {done}")
 
 
 if __name__ == "__main__":

@@ -121,7 +121,12 @@ def _six_cables(kernel: Callable, work: six_cables.SixCableWork) -> float:
     for batch in six_cables.batches(work):
         swing = swings(batch.segments)
         inertia = np.asarray(robot.inertia / robot.mass) @ _stacked(swing.axis)
-        fields = [_stacked(swing.reach), _stacked(swing.axis), inertia, np.stack([swing.angle, swing.end_beta_hat])]
+        fields = [
+            _stacked(swing.end_offset),
+            _stacked(swing.axis),
+            inertia,
+            np.stack([swing.angle, swing.end_beta_hat]),
+        ]
         table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
         inputs = [_lined(np.concatenate(fields)), _lined(table)]
         out = _lined(np.zeros(six_cables.LANES))

@@ -129,7 +129,7 @@ def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_ti
         chosen = [paths[k] for k in rows]
         settings = [SectionSettings(grid * 2**doubling, ramp_time, *one.speeds) for one in chosen]
         along = least_time_motions(
-            plan.problem, [one.section for one in chosen], settings, [one.pace for one in chosen]
+            plan.problem, [one.section for one in chosen], settings, [one.accelerations for one in chosen]
         )
         for k, one, each, fastest in zip(rows, chosen, settings, along, strict=True):
             answers[k] = _Faster(Ride(one.section, each, one.segments), fastest, one.deviation + fastest.deviation)

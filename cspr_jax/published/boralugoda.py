@@ -67,9 +67,9 @@ def _active() -> tuple[PublishedLine, PublishedLine, float]:
     minimum = _minimum_curve(bounds)
     up, down = int(minimum.up), int(minimum.down)
     # Braking is seen from the end.
-    gradient = float(bounds.down_slope[down])
+    gradient = float(bounds.down_change[down])
     lower = PublishedLine(-float(bounds.down[down]) - gradient, gradient)
-    return PublishedLine(float(bounds.up[up]), float(bounds.up_slope[up])), lower, largest
+    return PublishedLine(float(bounds.up[up]), float(bounds.up_change[up])), lower, largest
 
 
 def table_4_1() -> dict[Key, float | None]:

@@ -12,7 +12,7 @@ from scipy.optimize import fsolve
 from support.commands import cspr, plan, planned
 
 import cspr_jax
-from cspr_jax.families.beziers.launches.through_release import through
+from cspr_jax.families.beziers.launches.release import through
 from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.launch.landings import LaunchErrors, Throw, scatter
 

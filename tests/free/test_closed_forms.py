@@ -87,7 +87,7 @@ def test_splines_follow_a_motion(asked):
         tasks = FreeQuestion.of(problem, scene, poses, settings).tasks(96, 3)
         controls = controls_of(tasks, form.motions[0])
         at = states_at(form.motions[0], tasks.basis.tau.ravel())
-    near = tasks.basis.places(controls).reshape(-1, 3, 3) / form.duration[0] ** np.arange(3)[:, None]
+    near = tasks.basis.evaluate(controls).reshape(-1, 3, 3) / form.duration[0] ** np.arange(3)[:, None]
     np.testing.assert_allclose(near[:, 0], at.position, atol=1e-7)
     np.testing.assert_allclose(near[:, 2], at.acceleration, atol=1e-2)
 
@@ -99,7 +99,7 @@ def test_starts_of_the_segments_in_question(asked):
     several = ClosedForm("several", form.motions * 3, np.array([True, False, True]), np.array([5.0, 6.0, 7.0]))
     with double_precision():
         single = segments_of(FreeQuestion.of(problem, scene, poses, settings).tasks(24, 3))
-        begun = form_starts(single.taken(np.zeros(3, int)), np.array([0, 2]), [several, several])
+        begun = form_starts(single.take(np.zeros(3, int)), np.array([0, 2]), [several, several])
     assert begun.task.tolist() == [0, 1, 0, 1]
     assert begun.duration.ravel().tolist() == [5.0, 7.0, 5.0, 7.0]
     assert begun.controls.shape == (4, 1, 29, 3)
@@ -128,7 +128,7 @@ def test_starts_of_two_searches_agree(asked, durations, is_shared):
     with double_precision():
         single = segments_of(FreeQuestion.of(problem, scene, poses, settings).tasks(24, 3))
         begun, best = starts(single, KEYS["z0"], 2), {}
-        lanes = single.taken(begun.task)
+        lanes = single.take(begun.task)
         unknowns = started(lanes, begun.controls, begun.duration)
         for pair in ((1.0, 2.0), durations):
             optimum = Optima(unknowns._replace(duration=np.array(pair)[:, None]), np.ones(2, bool), np.zeros(2, int))

@@ -45,9 +45,9 @@ def moved(name, rng, surroundings):
     turning = None if robot.dof == 3 else quaternions
     free = np.full((2, robot.dof), np.nan)
     poses = FreePoses(places, turning, np.zeros((2, 3)), free, float(middle[2]))
-    question = FreeQuestion.of(problem, around, poses, FreeSettings(intervals=6, instants=3))
+    question = FreeQuestion.of(problem, around, poses, FreeSettings(intervals=6, samples=3))
     tasks = question.tasks(6, 3)
-    line = np.linspace(tasks.places[0, :, 0], tasks.places[0, :, 1], tasks.basis.controls, axis=1)[None]
+    line = np.linspace(tasks.ends[0, :, 0], tasks.ends[0, :, 1], tasks.basis.controls, axis=1)[None]
     return question, tasks, started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[1.0]]))
 
 
@@ -71,7 +71,7 @@ def test_planes_are_clearances_to_first_order(kind):
         surroundings = {"obstacles": [] if shape is None else [shape], "hull": "platform" in kind}
         question, tasks, unknowns = moved("cogiro", rng, surroundings)
         gap = contacts._gap(question, question.scene, meeting)
-        places = tasks.basis.places(tasks.controls(unknowns))[..., 0, :]
+        places = tasks.basis.evaluate(tasks.controls(unknowns))[..., 0, :]
         # Cables that are far from each other are linear, too.
         gap = gap._replace(of_poses=lambda p, q, whole=gap.of_poses: (whole(p, q)[0], np.ones(len(p), bool)))
         values, slopes = contacts._linear(tasks, places, gap)
@@ -91,7 +91,7 @@ def test_distances_of_cables_keep_the_sign_of_the_poses():
     with double_precision():
         question, tasks, _ = moved("cogiro", rng, {})
         pairs = [meeting for meeting in question.scene.contact_pairs if meeting.kind == "cables"]
-        robot, places, seen = question.problem.robot, tasks.places, 0
+        robot, places, seen = question.problem.robot, tasks.ends, 0
         flat = rng.uniform([-3.0, -2.0, 1.0, -0.3, -0.3, -0.3], [3.0, 2.0, 4.0, 0.3, 0.3, 0.3], (400, 6))
         positions, vectors = flat[:, :3], flat[:, 3:]
         quaternions = np.concatenate([np.ones((400, 1)), vectors], axis=1)
@@ -131,7 +131,7 @@ def test_spools_over_a_face_keep_their_side():
         half_turn = np.broadcast_to([0.0, 0.0, 1.7, 3.0, 0.0, 0.0], (1, 1, 4, 3, 6))
         for gap in gaps:
             always = gap._replace(of_poses=lambda p, q, whole=gap.of_poses: (whole(p, q)[0], np.ones(len(p), bool)))
-            assert (contacts._linear(tasks, tasks.places[:, :, :, None], always)[0] > 0.0).all()
+            assert (contacts._linear(tasks, tasks.ends[:, :, :, None], always)[0] > 0.0).all()
             assert (contacts._linear(tasks, half_turn, always)[0] < 0.0).all()
 
 
@@ -174,7 +174,7 @@ def across():
     middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
     question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
     ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
-    return question, dataclasses.replace(tasks, places=ends[None, None]), unknowns, ends
+    return question, dataclasses.replace(tasks, ends=ends[None, None]), unknowns, ends
 
 
 def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
@@ -211,17 +211,17 @@ def test_the_best_clear_motion_of_all_sides_is_taken(monkeypatch):
 
         def known(within, unknowns, *level, **levels):
             chosen = np.asarray(rows[len(sizes)])
-            sizes.append(len(within.places))
+            sizes.append(len(within.ends))
             several = unknowns._replace(inner=found.inner[chosen], duration=found.duration[chosen])
             return Optima(several, is_optimal[chosen], np.ones(len(chosen), int))
 
         monkeypatch.setattr(contacts, "optima", known)
         solid = scene(question.problem.robot, obstacles=[sphere([0.0, 0.0, 2.2], 0.05)])
         among = dataclasses.replace(question, scene=solid)
-        within, best = contacts._clear(among, tasks.taken(np.zeros(4, int)), found, {0: 1e-5})
+        within, best = contacts._clear(among, tasks.take(np.zeros(4, int)), found, {0: 1e-5})
         assert sizes == [4, 1, 1, 1][: contacts.SEARCHES]
         assert best.duration.tolist() == [[0.7]]
-        assert len(within.places) == 1
+        assert len(within.ends) == 1
 
 
 def test_planes_about_several_motions_are_those_of_each():
@@ -231,8 +231,8 @@ def test_planes_about_several_motions_are_those_of_each():
         question, tasks, unknowns = moved("cogiro", rng, {"obstacles": [shape], "hull": True})
         other = unknowns._replace(inner=unknowns.inner + 0.05 * rng.normal(size=unknowns.inner.shape))
         gap = contacts._gap(question, question.scene, meeting)
-        places = [tasks.basis.places(tasks.controls(each))[..., 0, :] for each in (unknowns, other)]
-        together = contacts._linear(tasks.taken(np.zeros(2, int)), np.concatenate(places), gap)
+        places = [tasks.basis.evaluate(tasks.controls(each))[..., 0, :] for each in (unknowns, other)]
+        together = contacts._linear(tasks.take(np.zeros(2, int)), np.concatenate(places), gap)
         for i, place in enumerate(places):
             for both, alone in zip(together, contacts._linear(tasks, place, gap), strict=True):
                 np.testing.assert_allclose(both[i], alone[0], atol=1e-12)
@@ -247,10 +247,10 @@ def test_motions_are_bent_along_the_segments_in_question():
         places = np.array([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
         poses = FreePoses(places, None, np.zeros((4, 3)), np.full((4, 3), np.nan), 1.0)
         tasks = FreeQuestion.of(problem, None, poses, FreeSettings()).tasks(24, 3)
-        line = np.linspace(tasks.places[0, :, 0], tasks.places[0, :, 1], tasks.basis.controls, axis=1)[None]
+        line = np.linspace(tasks.ends[0, :, 0], tasks.ends[0, :, 1], tasks.basis.controls, axis=1)[None]
         unknowns = started(tasks, line, np.ones((1, 3)))
-        deviation = list(contacts._bent(tasks, unknowns, np.array([True, False, True])))
-        before, *after = (tasks.basis.places(tasks.controls(one))[0, ..., 0, :] for one in (unknowns, *deviation))
+        deviation = list(contacts._deflected(tasks, unknowns, np.array([True, False, True])))
+        before, *after = (tasks.basis.evaluate(tasks.controls(one))[0, ..., 0, :] for one in (unknowns, *deviation))
     middle = [(one - before)[:, 12, 0] for one in after]
     assert len(deviation) == 8
     for change in middle:
@@ -268,16 +268,20 @@ def test_nothing_is_bounded_where_bodies_are_apart():
         question, tasks, unknowns = moved("cogiro", rng, {"obstacles": [sphere([0.0, 0.0, 30.0], 0.1)]})
         slacks = slacks_of(question, motions_of(tasks, unknowns, question.poses.z0))
         assert contacts._clearances(question, slacks).shape[1] == len(question.scene.contact_pairs)
-        assert contacts.apart(question, tasks, unknowns, slacks._replace(low=np.maximum(slacks.low, 0.0)), 1) is None
+        assert (
+            contacts.separated(question, tasks, unknowns, slacks._replace(low=np.maximum(slacks.low, 0.0)), 1) is None
+        )
         met = slacks.low.copy()
         met[3, -1] = -0.01
-        within, begun = contacts.apart(question, tasks, unknowns, slacks._replace(low=np.where(met < 0.0, met, 0.0)), 1)
+        within, begun = contacts.separated(
+            question, tasks, unknowns, slacks._replace(low=np.where(met < 0.0, met, 0.0)), 1
+        )
         far, still = contacts._parted(question, tasks, unknowns, {len(question.scene.contact_pairs) - 1: 1e-3}, np.inf)
         _, residual = far.equations(still)
     # The motion has the values of its planes: here 24 m or more, over the size of the robot.
     assert (still.values[..., -1] > 2.0).all()
     np.testing.assert_allclose(residual[..., -1], 0.0, atol=1e-12)
-    numbers = [number for number, _ in within.planes.least]
+    numbers = [number for number, _ in within.planes.minimum]
     assert len(question.scene.contact_pairs) - 1 in numbers
     assert begun.values.shape == within.low.shape
     assert within.n_limited == tasks.low.shape[-1]

@@ -7,9 +7,9 @@ import pytest
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.families.free import followed as module
+from cspr_jax.families.free import no_slower as module
 from cspr_jax.families.free.closed_forms import ClosedForm, form_starts
-from cspr_jax.families.free.followed import energy_along, followed
+from cspr_jax.families.free.no_slower import energy_along, followed
 from cspr_jax.families.free.poses import FreePoses, segments_of
 from cspr_jax.families.free.problem import FreeQuestion, FreeSettings
 from cspr_jax.motion.motion import states_at

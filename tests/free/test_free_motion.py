@@ -10,7 +10,7 @@ from cspr_jax.families.free import free_motion as free_motions
 from cspr_jax.families.free.poses import FreePoses
 from cspr_jax.families.free.problem import FreeQuestion, FreeSettings, slacks_of, tightened
 from cspr_jax.families.free.search import interior_point
-from cspr_jax.families.free.search.instants import DEPTH
+from cspr_jax.families.free.search.equations import DEPTH
 from cspr_jax.numerics.elementary import double_precision
 
 RING, SQUARE = (least_time_forms.ring_robot(count, 1.0, 2.0) for count in (3, 4))

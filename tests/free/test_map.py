@@ -78,7 +78,7 @@ def test_times_of_table_2_1():
             pairs.append(FreePoses(places, None, still, np.full((2, 3), np.nan), float(places[:, 2].mean())))
         far = FreePoses(np.array([[0.0, 0.0, 1.0], [40.0, 0.0, 0.5]]), None, still, np.full((2, 3), np.nan), 1.0)
         motions = free_motions(problem, None, [*pairs[:3], far, *pairs[3:]])
-    assert motions.rows.tolist() == [0, 1, 2, 4, 5, 6]
+    assert motions.indices.tolist() == [0, 1, 2, 4, 5, 6]
     assert motions.answers.feasible.all()
     times = np.array([reference.time for reference in references])
     # The fifth one has several optima, of which starts in the plan find others, too.

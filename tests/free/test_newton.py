@@ -9,10 +9,10 @@ from support.free_motions import problem_of
 
 from cspr_jax.families.free.poses import FreePoses, tasks_of
 from cspr_jax.families.free.search.basis import basis
-from cspr_jax.families.free.search.condensation import Softness, eliminated, less_missed, times, transposed
-from cspr_jax.families.free.search.instants import ValueBounds, bounds
+from cspr_jax.families.free.search.condensation import Softness, condensed, repaired_values, times, transposed
+from cspr_jax.families.free.search.equations import ValueBounds, bounds
 from cspr_jax.families.free.search.interior_point import started
-from cspr_jax.families.free.search.newton import gathered, newton_step
+from cspr_jax.families.free.search.newton import assembled_gradient, newton_step
 from cspr_jax.families.free.search.objectives import OBJECTIVES
 from cspr_jax.families.free.search.starts import starts
 from cspr_jax.families.free.search.tasks import ClearancePlanes, Unknowns
@@ -57,21 +57,23 @@ def moved(unknowns, step, size):
 def test_splines_have_the_derivatives_and_the_pieces_of_their_control_points():
     table, rng = basis(5, 4), np.random.default_rng(1)
     controls = rng.normal(size=(table.controls, 2))
-    places = table.places(controls)
+    places = table.evaluate(controls)
     assert table.tau[0, 0] == 0.0
     assert table.tau[-1, -1] == 1.0
     pieces = np.einsum("mbk,mkd->mbd", table.pieces, table.in_intervals(controls))
     np.testing.assert_allclose(pieces[1:, 0], pieces[:-1, -1], atol=1e-12)
     np.testing.assert_allclose(pieces[[0, -1], [0, -1]], controls[[0, -1]], atol=1e-12)
-    np.testing.assert_allclose(places[0, 0, 1], (controls[1] - controls[0]) / table.end_slope, atol=1e-9)
+    np.testing.assert_allclose(places[0, 0, 1], (controls[1] - controls[0]) / table.velocity_step, atol=1e-9)
     still = controls.copy()
     still[1] = still[0]
-    np.testing.assert_allclose(table.places(still)[0, 0, 2], (still[2] - still[0]) / table.end_bend, atol=1e-9)
+    np.testing.assert_allclose(
+        table.evaluate(still)[0, 0, 2], (still[2] - still[0]) / table.acceleration_step, atol=1e-9
+    )
     # Cubics are integrated exactly.
-    assert np.sum(table.shares * (5.0 * table.tau**3 - table.tau)) == pytest.approx(0.75, abs=1e-12)
+    assert np.sum(table.weights * (5.0 * table.tau**3 - table.tau)) == pytest.approx(0.75, abs=1e-12)
     fitted = table.fit @ np.sin(table.averages)
-    np.testing.assert_allclose(table.places(fitted[:, None])[..., 0, 0], np.sin(table.tau), atol=1e-6)
-    np.testing.assert_allclose(table.places(fitted[:, None])[..., 1, 0], np.cos(table.tau), atol=1e-4)
+    np.testing.assert_allclose(table.evaluate(fitted[:, None])[..., 0, 0], np.sin(table.tau), atol=1e-6)
+    np.testing.assert_allclose(table.evaluate(fitted[:, None])[..., 1, 0], np.cos(table.tau), atol=1e-4)
 
 
 def test_outer_control_points_have_their_derivatives(searched):
@@ -82,9 +84,9 @@ def test_outer_control_points_have_their_derivatives(searched):
     push = rng.normal(size=(1, 2, 12))
     sides = [moved(unknowns, step, size) for size in (-STEP, STEP)]
     before, after = (tasks.controls(one).reshape(1, 2, -1)[..., tasks.border] for one in sides)
-    np.testing.assert_allclose(times(tasks.border_slopes(unknowns), by), (after - before) / (2 * STEP), atol=1e-7)
-    before, after = (times(transposed(tasks.border_slopes(one)), push) for one in sides)
-    bends = times(tasks.border_bends(unknowns, push), by)
+    np.testing.assert_allclose(times(tasks.border_jacobians(unknowns), by), (after - before) / (2 * STEP), atol=1e-7)
+    before, after = (times(transposed(tasks.border_jacobians(one)), push) for one in sides)
+    bends = times(tasks.border_hessians(unknowns, push), by)
     np.testing.assert_allclose(bends, (after - before) / (2 * STEP), atol=1e-7)
 
 
@@ -102,21 +104,19 @@ def test_equations_have_their_derivatives(searched):
     (first, before, less), (last, after, more) = at(-STEP), at(STEP)
     with double_precision():
         equations, _ = tasks.equations(unknowns)
-    lagrangian = times(transposed(equations.slope), unknowns.multipliers)
+    lagrangian = times(transposed(equations.jacobian), unknowns.multipliers)
     change = ((last - first) / (2 * STEP)).reshape(1, 2, -1)
-    slope = gathered(tasks.basis, lagrangian)
+    slope = assembled_gradient(tasks.basis, lagrangian)
     along = np.sum(slope[..., :-2] * change, axis=-1) + slope[..., -2] * step[0]
     values = (np.sum(residual * unknowns.multipliers, axis=(2, 3, 4)) for residual in (less, more))
     low, high = values
     np.testing.assert_allclose(along, (high - low) / (2 * STEP), rtol=1e-6)
-    places = tasks.basis.places((last - first) / (2 * STEP)).reshape(1, 2, 6, 3, -1)
+    places = tasks.basis.evaluate((last - first) / (2 * STEP)).reshape(1, 2, 6, 3, -1)
     scalars = (step[0][:, :, None, None, None], np.full((1, 2, 1, 1, 1), 7.0))
     state = np.concatenate([places, *(np.broadcast_to(one, (1, 2, 6, 3, 1)) for one in scalars)], axis=-1)
-    slopes = (times(transposed(one.slope), unknowns.multipliers) for one in (before, after))
+    slopes = (times(transposed(one.jacobian), unknowns.multipliers) for one in (before, after))
     low, high = slopes
-    np.testing.assert_allclose(
-        times(equations.second_derivative, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4
-    )
+    np.testing.assert_allclose(times(equations.hessian, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4)
     balances = (times(transposed(one.matrix), unknowns.multipliers[..., :3]) for one in (before, after))
     low, high = balances
     np.testing.assert_allclose(times(equations.mixed, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-5)
@@ -138,7 +138,7 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     factor = rng.normal(size=(*shape, 3, 3))
     soft = Softness(np.array([0.3]), np.eye(3) + factor @ transposed(factor), unknowns.multipliers)
     np.testing.assert_allclose(soft.paid(soft.missed(residual)), residual, atol=1e-12)
-    local = eliminated(equations, weights, push, residual, soft)
+    local = condensed(equations, weights, push, residual, soft)
     step = rng.normal(size=(*shape, 11))
     change, multipliers = local.changes(step, 3, 3)
     # The wrenches of tensions, and the identity of other values.
@@ -149,11 +149,11 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     mixed[..., :3, :] = equations.mixed
     first = weights * change + times(mixed, step) + times(transposed(by_values), multipliers)
     np.testing.assert_allclose(first, push, atol=1e-9)
-    second = times(by_values, change) + times(equations.slope, step) - soft.missed(multipliers)
+    second = times(by_values, change) + times(equations.jacobian, step) - soft.missed(multipliers)
     np.testing.assert_allclose(second, residual, atol=1e-9)
-    whole = times(equations.second_derivative, step) + times(transposed(mixed), change)
-    whole = whole + times(transposed(equations.slope), multipliers)
-    np.testing.assert_allclose(times(local.second_derivative, step) + local.slope, whole, atol=1e-8)
+    whole = times(equations.hessian, step) + times(transposed(mixed), change)
+    whole = whole + times(transposed(equations.jacobian), multipliers)
+    np.testing.assert_allclose(times(local.hessian, step) + local.gradient, whole, atol=1e-8)
 
 
 def test_values_make_up_for_what_equations_miss(searched):
@@ -166,7 +166,7 @@ def test_values_make_up_for_what_equations_miss(searched):
     factor = rng.normal(size=(*residual.shape[:-1], 3, 3))
     soft = Softness(np.array([0.3]), np.eye(3) + factor @ transposed(factor), unknowns.multipliers)
     missed = rng.normal(size=residual.shape)
-    change = less_missed(matrix, weights, missed, soft)
+    change = repaired_values(matrix, weights, missed, soft)
     left = missed.copy()
     left[..., :3] += times(matrix, change[..., :3])
     left[..., 3:] += change[..., 3:]
@@ -182,7 +182,7 @@ def test_wrenches_of_fewer_dimensions_give_numbers():
     matrix = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])[None, None, None, None]
     weights = np.array([1e-7, 1e-7, 1.0, 1.0])[None, None, None, None]
     soft = Softness(np.array([1e-6]), 1e-6 * np.eye(3)[None, None, None, None], np.zeros((1, 1, 1, 1, 4)))
-    change = less_missed(matrix, weights, np.array([1.0, 1.0, 0.5, 0.2])[None, None, None, None], soft)
+    change = repaired_values(matrix, weights, np.array([1.0, 1.0, 0.5, 0.2])[None, None, None, None], soft)
     np.testing.assert_allclose(change.ravel(), [-0.5, -0.5, -0.5, -0.2], rtol=1e-5)
 
 
@@ -233,20 +233,20 @@ def test_steps_go_down_the_merit_of_each_objective(searched, name):
             )
             for size in (-STEP, STEP)
         ]
-    assert step.fall[0] < 0.0
+    assert step.merit_derivative[0] < 0.0
     assert (step.change.level != 0.0).all() == (name in ("tension", "margin"))
-    assert step.fall[0] == pytest.approx((sizes[1] - sizes[0]) / (2 * STEP), rel=1e-5)
+    assert step.merit_derivative[0] == pytest.approx((sizes[1] - sizes[0]) / (2 * STEP), rel=1e-5)
 
 
 def test_starts_are_the_same_for_each_task_and_join_its_poses(searched):
     tasks, _ = searched
     single = dataclasses.replace(
         tasks,
-        places=np.moveaxis(tasks.places, 1, 0),
+        ends=np.moveaxis(tasks.ends, 1, 0),
         references=np.moveaxis(tasks.references, 1, 0),
     )
     begun = starts(single, 1.2)
     assert [len(starts(single, 1.2, most).task) for most in (1, 5, 12)] == [2, 10, 24]
     assert (np.bincount(begun.task) == len(begun.task) // 2).all()
     for side, end in ((0, 0), (1, -1)):
-        np.testing.assert_allclose(begun.controls[:, 0, end], single.places[begun.task, 0, side], atol=1e-9)
+        np.testing.assert_allclose(begun.controls[:, 0, end], single.ends[begun.task, 0, side], atol=1e-9)

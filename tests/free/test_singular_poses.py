@@ -14,7 +14,7 @@ import cspr_jax
 from cspr_jax.families.free.free_motion import free_motion
 from cspr_jax.families.free.poses import FreePoses, determinants, divided
 from cspr_jax.families.free.problem import FreeQuestion, FreeSettings
-from cspr_jax.families.free.search.derivatives import instant_values, residuals
+from cspr_jax.families.free.search.derivatives import equation_values, residuals
 from cspr_jax.families.free.search.determinants import determinant, unit_wrenches, with_derivatives
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
@@ -115,17 +115,19 @@ def test_derivatives_are_finite_differences(pattern, longest):
         def at(change):
             moved, duration = place + change[:-1].reshape(place.shape), np.array([0.8]) + change[-1]
             fixed = problem.robot, problem.limits, longest, reference, moved, duration, tensions
-            return instant_values(*fixed, multipliers), residuals(*fixed)
+            return equation_values(*fixed, multipliers), residuals(*fixed)
 
         here, missed = at(np.zeros(3 * d + 1))
         sides = [[at(sign * step * row) for sign in (-1.0, 1.0)] for row in np.eye(3 * d + 1)]
     np.testing.assert_allclose(here.residual, missed, atol=1e-13)
     slopes = np.stack([(after[1] - before[1])[0] / (2.0 * step) for before, after in sides], axis=-1)
-    np.testing.assert_allclose(here.slope[0, :, :-1], slopes, atol=1e-6)
-    bends = [multipliers[0] @ (after[0].slope - before[0].slope)[0, :, :-1] / (2.0 * step) for before, after in sides]
-    np.testing.assert_allclose(here.second_derivative[0, :-1, :-1], bends, atol=1e-5)
-    assert here.slope[0, -1, :d].any()
-    assert not here.slope[0, -1, d:].any()
+    np.testing.assert_allclose(here.jacobian[0, :, :-1], slopes, atol=1e-6)
+    bends = [
+        multipliers[0] @ (after[0].jacobian - before[0].jacobian)[0, :, :-1] / (2.0 * step) for before, after in sides
+    ]
+    np.testing.assert_allclose(here.hessian[0, :-1, :-1], bends, atol=1e-5)
+    assert here.jacobian[0, -1, :d].any()
+    assert not here.jacobian[0, -1, d:].any()
     assert here.residual[0, -1] == pytest.approx(-at_place(problem, place[0, 0]), rel=1e-12)
 
 
@@ -177,7 +179,7 @@ def test_a_motion_goes_round_singular_poses():
     ends = poses([[-0.3, 0.1, 1.8], [0.3, -0.2, 2.2]], [[1.0, 0.0, 0.0, 0.0]] * 2)
     with double_precision():
         problem = problem_of(oracle.mssm(), 40.0)
-        motion = free_motion(problem, None, ends, FreeSettings(intervals=24, instants=3, starts=4))
+        motion = free_motion(problem, None, ends, FreeSettings(intervals=24, samples=3, starts=4))
         (spline,) = motion.motions
         states = states_along(spline, np.linspace(0.0, 1.0, 201))
         values = jax.vmap(lambda p, r: determinant(problem.robot, at_rest(p, r)))(states.position, states.rotation)

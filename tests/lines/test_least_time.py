@@ -56,11 +56,11 @@ def functions(bounds):
 
     def upper(s):
         s = np.asarray(s, float)
-        return np.min(bounds.up[:, None] + bounds.up_slope[:, None] * s.ravel(), axis=0).reshape(s.shape)
+        return np.min(bounds.up[:, None] + bounds.up_change[:, None] * s.ravel(), axis=0).reshape(s.shape)
 
     def lower(s):
         s = np.asarray(s, float)
-        return -np.min(bounds.down[:, None] + bounds.down_slope[:, None] * (1.0 - s.ravel()), axis=0).reshape(s.shape)
+        return -np.min(bounds.down[:, None] + bounds.down_change[:, None] * (1.0 - s.ravel()), axis=0).reshape(s.shape)
 
     return lower, upper
 
@@ -120,7 +120,7 @@ def test_the_case_of_the_text():
     assert bound == pytest.approx(3.10085856, abs=1e-8)
     # (22) to (25): -0.755, -1.887; -0.276, 0.867; -0.350, 0.438; -0.432, -0.031.
     finite = np.isfinite(bounds.up)
-    lines = sorted(zip(bounds.up_slope[finite].round(3), bounds.up[finite].round(3), strict=True))
+    lines = sorted(zip(bounds.up_change[finite].round(3), bounds.up[finite].round(3), strict=True))
     assert lines == [(-0.350, 0.438), (-0.276, 0.867), (0.0, 0.602)]
 
 
@@ -169,7 +169,7 @@ def test_the_way_back_is_the_same_backwards():
 
 def test_a_rising_bound_is_touched_before_its_corner():
     """Away from an edge the bound rises, and the curve may touch it before Q3: the rule of the text passes it."""
-    flat = {"down": np.array([9.0]), "down_slope": np.array([0.0])}
+    flat = {"down": np.array([9.0]), "down_change": np.array([0.0])}
     one = jnp.asarray([[0.5, 30.0]]), jnp.asarray([[0.02, 30.0]])
     found = 0
     for start, slope in (np.asarray(x)[0] for x in one):
@@ -182,9 +182,9 @@ def test_a_rising_bound_is_touched_before_its_corner():
     assert found == 2
 
 
-def sides_of(up, up_slope, down, down_slope):
+def sides_of(up, up_change, down, down_change):
     everywhere = np.zeros_like(up), np.ones_like(up)
-    return Sides(*(np.asarray(x, float) for x in (up, up_slope, down, down_slope, *everywhere)))
+    return Sides(*(np.asarray(x, float) for x in (up, up_change, down, down_change, *everywhere)))
 
 
 @pytest.mark.parametrize("name", ["quintic", "cubic"])

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
+from cspr_jax.families.platforms.six_cable_proof.work_list import smallest_nodes
 from cspr_jax.motion.amplitudes import from_polynomial, named
 from cspr_jax.verification.bounds.blocks import INSTANTS, Parts, growing, parts_of_arcs
 
@@ -72,7 +72,7 @@ def test_least_values_and_where_the_worst_is():
     nodes = rng.normal(size=(3, 4, 200))
     nodes[0, 2, 5] = np.nan
     nodes[0, 1:3, 7] = -9.0  # the first of equal ones
-    least, place = jax.jit(lambda x: least_nodes(x, 2, places))(list(nodes))
+    least, place = jax.jit(lambda x: smallest_nodes(x, 2, places))(list(nodes))
     np.testing.assert_array_equal(least, nodes.min(1)[None])
     worst = np.minimum(nodes[0], nodes[1])
     wanted = np.where(np.isnan(worst).any(0), np.nan, places[worst.argmin(0)])

@@ -9,7 +9,7 @@ from support.other_robots import displaced, on_balls, ratios, uncertain, worst_r
 from support.platforms import FROM_REST, stacked
 from support.random_motions import ROBOTS, motions_of, problem_of, quintic
 
-from cspr_jax.families.platforms.motions import rows as some_of
+from cspr_jax.families.platforms.platform_segment import take_segments as some_of
 from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
 from cspr_jax.families.platforms.six_cable_proof.enclosures import Robustness
 from cspr_jax.motion.platform_kind import PlatformMotionKind
@@ -63,7 +63,7 @@ MANY = [(robot, kind) for robot in ROBOTS for kind in (FROM_REST, BETWEEN)]
 def test_no_robot_within_a_proved_multiple_of_the_uncertainty_fails(name, kind, count, robots):
     robot, limits = ROBOTS[name], Limits(uncertainty=BALLS)
     drawn, segments, arcs = feasible_motions(name, kind, count, limits)
-    robustness = Robustness(problem_of(robot, limits), kind, batch=64, count_instants=lambda _: None)
+    robustness = Robustness(problem_of(robot, limits), kind, batch=64, count_samples=lambda _: None)
     found = robustness.tolerated(segments, arcs)
     rng = np.random.default_rng(1)
     assert (found.proved > 0.0).mean() > 0.9
@@ -91,7 +91,7 @@ def test_a_robot_that_refutes_a_multiple_fails_in_the_oracle_too():
     robot, limits = ROBOTS["mssm"], Limits(uncertainty=BALLS)
     drawn, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)
     problem = problem_of(robot, limits)
-    robustness = Robustness(problem, FROM_REST, batch=64, count_instants=lambda _: None)
+    robustness = Robustness(problem, FROM_REST, batch=64, count_samples=lambda _: None)
     refuted, fails = robustness.tolerated(segments, arcs).refuted, []
     for i, own in enumerate(drawn):
         one, only = some_of(segments, [i]), arcs[[i]]
@@ -135,7 +135,7 @@ def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
     drawn = motions_of(rng, robot, kind, 20)
     segments, arcs = stacked([own[3] for own in drawn]), np.array([own[1] for own in drawn])
     problem = problem_of(robot, Limits(uncertainty=BALLS))
-    robustness = Robustness(problem, kind, batch=64, count_instants=lambda _: None)
+    robustness = Robustness(problem, kind, batch=64, count_samples=lambda _: None)
     blocks = parts_of_arcs(arcs, np.zeros(0), 512)
     blocks = blocks.part(rng.choice(len(blocks.row), 200, replace=False))
     known = robustness.enclosure(segments, arcs, blocks)
@@ -188,7 +188,7 @@ def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
 def test_verdicts_are_those_of_the_multiples():
     limits = Limits(uncertainty=BALLS)
     _, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)
-    robustness = Robustness(problem_of(ROBOTS["mssm"], limits), FROM_REST, batch=64, count_instants=lambda _: None)
+    robustness = Robustness(problem_of(ROBOTS["mssm"], limits), FROM_REST, batch=64, count_samples=lambda _: None)
     whole, short = robustness.tolerated(segments, arcs), robustness.tolerated(segments, arcs, full=False)
     assert ((short.proved >= 1.0) | (whole.proved < 1.001)).all()
     assert ((short.refuted > 1.0) | (short.proved == 0.0)).all()
@@ -197,5 +197,5 @@ def test_verdicts_are_those_of_the_multiples():
     assert (short.refuted <= 1.0).any()
     # Twice the uncertainty, half the multiple.
     twice = Limits(uncertainty=uncertain(spool_positions=2 * SPOOLS, mass_centre=2 * CENTRE))
-    half = Robustness(problem_of(ROBOTS["mssm"], twice), FROM_REST, batch=64, count_instants=lambda _: None)
+    half = Robustness(problem_of(ROBOTS["mssm"], twice), FROM_REST, batch=64, count_samples=lambda _: None)
     assert half.tolerated(segments, arcs).proved == pytest.approx(0.5 * whole.proved, rel=0.03)

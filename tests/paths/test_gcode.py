@@ -8,8 +8,8 @@ import pytest
 
 from cspr_jax.config.gcode.reading import read_program
 from cspr_jax.errors import ConfigError
-from cspr_jax.families.paths.geometry.arcs import elements_of
-from cspr_jax.families.paths.geometry.corners import tracks_of
+from cspr_jax.families.paths.geometry.corners import position_paths_of
+from cspr_jax.families.paths.geometry.elements import elements_of
 
 PROGRAM = """%
 N10 G21 G90 (millimetres; absolute) ; and more
@@ -113,8 +113,8 @@ def test_a_tangent_arc_of_rounded_numbers_runs_on(tmp_path):
     centre = 7.8 * np.array([-along[1], along[0]])
     (x, y), (i, j) = [12.345, 6.789] + centre + 7.8 * along, centre
     text = f"G0 X0 Y0 Z0\nG1 X12.345 Y6.789\nG3 X{x:.3f} Y{y:.3f} I{i:.3f} J{j:.3f}"
-    assert len(tracks_of(elements_of(moves(tmp_path, text)))) == 1
-    assert len(tracks_of(elements_of(moves(tmp_path, text.replace("Y0 Z0", "Y0.05 Z0"))))) == 2
+    assert len(position_paths_of(elements_of(moves(tmp_path, text)))) == 1
+    assert len(position_paths_of(elements_of(moves(tmp_path, text.replace("Y0 Z0", "Y0.05 Z0"))))) == 2
 
 
 @pytest.mark.parametrize(("unit", "decimals"), [("G21", 0), ("G21", 1), ("G21", 2), ("G20", 3), ("G20", 2)])
@@ -165,7 +165,7 @@ def test_planes_are_those_of_turned_axes(tmp_path):
             middle = 0.5 * one.length
             assert other.length == pytest.approx(one.length, rel=1e-12)
             np.testing.assert_allclose(
-                other.nodes(0.0, middle).place[-1], one.nodes(0.0, middle).place[-1][order], atol=1e-12
+                other.nodes(0.0, middle).position[-1], one.nodes(0.0, middle).position[-1][order], atol=1e-12
             )
 
 
@@ -213,8 +213,8 @@ def test_what_is_skipped_is_counted(tmp_path):
     assert (first.start, first.ends_at_rest, first.feed) == ([0.01, 0.02, pytest.approx(0.0003)], True, "F1500")
     assert second.end == [0.02, 0.03, pytest.approx(0.0003)]
     # The motion stops for a pause although the corner could be blended.
-    assert len(tracks_of(elements_of([first, second]), "blend", 0.001)) == 2
-    assert len(tracks_of(elements_of([first._replace(ends_at_rest=False), second]), "blend", 0.001)) == 1
+    assert len(position_paths_of(elements_of([first, second]), "blend", 0.001)) == 2
+    assert len(position_paths_of(elements_of([first._replace(ends_at_rest=False), second]), "blend", 0.001)) == 1
     skipped, *others = notes(tmp_path, SLICED)
     assert "9 words that change no path are skipped" in skipped
     for words in ("E (3 times)", "G28 (2 times)", "M140", "M104", "M82", "M106"):

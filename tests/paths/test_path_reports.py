@@ -11,8 +11,8 @@ from support.commands import plan
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.families.paths.least_time.constraint_names import row_names
-from cspr_jax.families.paths.least_time.constraints import path_rows
+from cspr_jax.families.paths.least_time.constraints import path_half_planes
+from cspr_jax.families.paths.least_time.refusals import half_plane_names
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.outputs.plots.motions.phase_planes import phase_plane_figure
@@ -48,10 +48,10 @@ def test_names_of_half_planes():
         np.array([0.2, 1.0, -0.15]),
     )
     state = State(jnp.asarray(place), jnp.asarray(rate), jnp.asarray(second_derivative))
-    rows = jax.tree.map(np.asarray, path_rows(robot, limits, state, jnp.asarray(jnp.inf)))
-    names = row_names(Problem(robot, limits, named("quintic")), state, rows.u, rows.x)
+    rows = jax.tree.map(np.asarray, path_half_planes(robot, limits, state, jnp.asarray(jnp.inf)))
+    names = half_plane_names(Problem(robot, limits, named("quintic")), state, rows.u, rows.x)
     assert len(names) == len(rows.u) == 12
-    for (flag, cable), u, x, most in list(zip(names, rows.u, rows.x, rows.most, strict=True))[:6]:
+    for (flag, cable), u, x, most in list(zip(names, rows.u, rows.x, rows.bound, strict=True))[:6]:
         speed = 0.7  # squared; any one
         values = tensions_for(place, rate * (most - x * speed) / u + second_derivative * speed)
         limit = {Verdict.SLACK_CABLE: LEAST, Verdict.OVER_TENSION: LARGEST}[flag]

@@ -65,7 +65,7 @@ def test_bounds_over_cells_hold_the_smallest_slacks(kind):
         units = {"N": ("tension", weight), "m/s": ("cable_speed_max", 0.6 * pace)}
         units["m/s^2"] = ("cable_acceleration_max", 0.5 * 9.81)
         for unit, (name, scale) in units.items():
-            of_unit = [row.unit == unit for row in slacks.rows]
+            of_unit = [row.unit == unit for row in slacks.criteria]
             least = np.asarray(sampled[name]).reshape(len(times), -1).min(1) / scale
             low, high = slacks.low[:, of_unit].min(1), slacks.high[:, of_unit].min(1)
             assert (low <= least + 1e-9).all()

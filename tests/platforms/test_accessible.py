@@ -131,7 +131,7 @@ def test_definitions_agree():
 def test_rays_of_a_scan_go_as_far_in_short_legs(monkeypatch):
     """In legs of three steps, the last of one, as in one leg of all sixteen."""
     whole = [accessible(ours(MSSM), place(radius, 0.4), "scan", 8) for radius in (0.0, 1.5)]
-    monkeypatch.setattr(scans, "LEG", 3)
+    monkeypatch.setattr(scans, "RAY_STEPS", 3)
     for radius, one in zip((0.0, 1.5), whole, strict=True):
         legs = accessible(ours(MSSM), place(radius, 0.4), "scan", 8)
         np.testing.assert_array_equal(legs.angles, one.angles)

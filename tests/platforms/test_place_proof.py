@@ -13,8 +13,8 @@ from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of,
 
 from cspr_jax.families.platforms.six_cable_proof import cable_contacts
 from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep
-from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS, place_blocks
-from cspr_jax.families.platforms.six_cable_proof.pose_proof import PARTS, PlaceCertifier
+from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS, pose_blocks
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import PARTS, PoseCertifier
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.contacts.interference import contacts, platform_hit
 from cspr_jax.robots.contacts.interference_lanes import residual
@@ -76,9 +76,7 @@ def block_breaks(count, seed, kind, robot):
     start = rng.uniform(0.0, 0.95, count)
     stop = np.minimum(start + rng.uniform(0.05, 0.5, count) / arcs, 1.0)
     pairs = tuple((int(i), int(j)) for i, j in near.pairs)
-    kernel = partial(
-        place_blocks, problem, (near.sides, near.normal), np.ones(()), pairs=pairs, kind=kind, margins=True
-    )
+    kernel = partial(pose_blocks, problem, (near.sides, near.normal), np.ones(()), pairs=pairs, kind=kind, margins=True)
     found = in_batches(kernel, (segments, arcs.astype(float), start, stop), batch_size=BATCH, axis=-1)
     broken = 0
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
@@ -130,7 +128,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
     """Proofs of random motions: contradicted by samples, undecided, met or hit, clear."""
     some = motions_of(np.random.default_rng(seed), robot, kind, count)
     problem = problem_of(robot)
-    certifier = PlaceCertifier(problem, kind, batch=BATCH, count_instants=lambda count: None)
+    certifier = PoseCertifier(problem, kind, batch=BATCH, count_samples=lambda count: None)
     proof = certifier.prove(stacked([x[3] for x in some]), np.array([x[1] for x in some]))
     contradicted = 0
     for i, (segment, p, beta, _) in enumerate(some):
@@ -140,7 +138,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
         hit = bool(oracle.platform_hit(robot, m.position, m.rotation).any())
         is_below = bool((below_spools(robot, m.position) > 0.0).all())
         contradicted += bool(proof.is_proved[i]) and (crossed or hit or not is_below)
-        contradicted += bool(proof.is_refuted[i]) and not happens_near(robot, segment, p, beta, proof.instant[i])
+        contradicted += bool(proof.is_refuted[i]) and not happens_near(robot, segment, p, beta, proof.refuted_tau[i])
         contradicted += (bool(proof.met[i]) and not crossed) + (bool(proof.hit[i]) and not hit)
     undecided = ~(proof.is_proved | proof.is_refuted)
     return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())

@@ -28,11 +28,10 @@ from support.platforms import (
 )
 
 from cspr_jax.families.platforms.platform_segment import motion
-from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes, state
+from cspr_jax.families.platforms.platform_segment_lanes import phase_lanes, state
 from cspr_jax.families.platforms.six_cable_proof.checker import slacks_at
 from cspr_jax.families.platforms.six_cable_proof.pose_proof import cables_beside
-from cspr_jax.families.platforms.six_cable_proof.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.families.platforms.six_cable_proof.slacks import pose_slacks
+from cspr_jax.families.platforms.six_cable_proof.slacks import moving_slacks, order, pose_slacks, static_slacks
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.plans import choices, planning
@@ -175,10 +174,10 @@ def test_cables_beside_the_middles_of_blocks():
 @functools.partial(jax.jit, static_argnames="pairs")
 def as_lanes(problem, batch, p, t, *, pairs):
     """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
-    instant = instant_lanes(problem.amplitude, batch.sense, p, t)
+    instant = phase_lanes(problem.amplitude, batch.sense, p, t)
     here = state(batch, p, instant, USUAL)
     cables = cable_lanes(problem.robot, here.position, here.rotation)
-    slacks = moving_slacks(problem, batch, p, instant, USUAL) + still_slacks(problem, batch, here, cables)
+    slacks = moving_slacks(problem, batch, p, instant, USUAL) + static_slacks(problem, batch, here, cables)
     gaps = interference_lanes.gaps(problem.robot.base_points, pairs, cables)
     return jnp.stack(slacks), *interference_lanes.as_arrays(
         gaps, interference_lanes.cable_directions(cables, here.rotation)

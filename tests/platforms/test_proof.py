@@ -17,9 +17,9 @@ from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.families.platforms.arcs import Candidates, segments_with
 from cspr_jax.families.platforms.beta_hat import end_options
-from cspr_jax.families.platforms.motions import Motions
+from cspr_jax.families.platforms.platform_segment import Motions
 from cspr_jax.families.platforms.redundant import redundant_kernels
-from cspr_jax.families.platforms.redundant.crossings import passed_over
+from cspr_jax.families.platforms.redundant.crossings import crossings
 from cspr_jax.families.platforms.six_cable_proof import tension_proof
 from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker, slacks_at
 from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS
@@ -106,7 +106,7 @@ class Samples:
 
             return in_batches(kernel, (*motions.items(which), tau), batch_size=BATCH)
 
-        return np.logical_or(*passed_over(vectors, self._platform, row, ends, len(motions.arcs)))
+        return np.logical_or(*crossings(vectors, self._platform, row, ends, len(motions.arcs)))
 
 
 def against_samples(name, kind, count, seed=1):
@@ -119,12 +119,12 @@ def against_samples(name, kind, count, seed=1):
     wrong = 0
     tau = np.linspace(0.0, 1.0, INSTANTS)
     for i in np.flatnonzero(is_proved):
-        own = motions.rows(np.array([i]))
+        own = motions.take(np.array([i]))
         row = np.zeros(INSTANTS, int)
         wrong += bool(samples.slack(own, row, tau).min() <= 0.0)
         wrong += bool(samples.touches(own, row[1:], (tau[:-1], tau[1:])).any())
     refuted = np.flatnonzero(~is_proved & ~is_unsure)
-    at = checks.instant[refuted]
+    at = checks.refuted_tau[refuted]
     breaks = np.zeros(len(refuted), bool)
     for values in (samples.slack, samples.tension) if len(refuted) else ():
         breaks |= ~(values(motions, refuted, at) > 0.0)
@@ -152,10 +152,10 @@ def test_no_motion_is_refuted_where_its_tensions_are_rounding():
     """At a node at 0.766 three cables lie nearly in one plane; a cable is slack elsewhere, and that is named."""
     robot = robot_of("laval-mssm")
     problem = Problem(robot, Limits(), named("quintic"))
-    motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([107]))
+    motions = drawn(robot, FROM_REST, 400, 9).take(np.array([107]))
     checks = PlatformChecker(problem, FROM_REST, batch=64).check(*motions, margins=False)
     assert checks.verdict[0] == Verdict.SLACK_CABLE.value
-    assert Samples(problem, FROM_REST).slack(motions, np.array([0]), checks.instant)[0] < -0.01
+    assert Samples(problem, FROM_REST).slack(motions, np.array([0]), checks.refuted_tau)[0] < -0.01
 
 
 @pytest.mark.thorough
@@ -163,7 +163,7 @@ def test_flags_are_the_same_with_margins_beside_a_singularity():
     """Beyond one a slack has no meaning, before it a cable may be slack: the flags say the same without margins."""
     robot = robot_of("laval-mssm")
     problem = Problem(robot, Limits(), named("quintic"))
-    motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([6, 170, 249, 251, 356, 363]))
+    motions = drawn(robot, FROM_REST, 400, 9).take(np.array([6, 170, 249, 251, 356, 363]))
     checker = PlatformChecker(problem, FROM_REST, batch=64)
     with_margins, without = (checker.check(*motions, margins=x).verdict for x in (True, False))
     np.testing.assert_array_equal(with_margins, without)

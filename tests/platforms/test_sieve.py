@@ -11,7 +11,7 @@ from support.platforms import EFFECTIVE, FROM_REST, MSSM, Z0, checker_of, made, 
 
 from cspr_jax.families.platforms.arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.families.platforms.six_cable_proof import screen
-from cspr_jax.families.platforms.six_cable_proof.slack_lanes import certain_tension
+from cspr_jax.families.platforms.six_cable_proof.slacks import certain_tension
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.platform_kind import USUAL
 from cspr_jax.robots.statics.wrench_lanes import CableLanes, balance
@@ -61,7 +61,7 @@ def check_search(motions, amplitude):
     np.testing.assert_array_equal(arcs, wanted)
     assert passes[found.arcs[some], some].all()
     assert 0 < (wanted > 0).sum() < motions
-    work, brute = (sum(c.done[name] for name in ("sieve", "checks")) for c in (checker, full))
+    work, brute = (sum(c.done[name] for name in ("screen", "checks")) for c in (checker, full))
     assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
 
 
@@ -71,12 +71,12 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     checker, rng = checker_of(kind=kind, batch=64), np.random.default_rng(4)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
-    lowest = checker.sieve.lowest(segments, 6, tau)
+    lowest = checker.screen.lowest(segments, 6, tau)
     wanted = lowest <= -1e-7
     assert 30 < wanted.sum() < 270
-    np.testing.assert_array_equal(checker.sieve.refuted(segments, 6, tau), wanted)
+    np.testing.assert_array_equal(checker.screen.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
-    np.testing.assert_array_equal(checker.sieve.refuted(few, 6, tau), wanted[:16])
+    np.testing.assert_array_equal(checker.screen.refuted(few, 6, tau), wanted[:16])
     whole = screen._rough_and_certain
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
@@ -85,7 +85,7 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
             return wrong(single_precision), certain
 
         monkeypatch.setattr(screen, "_rough_and_certain", spoiled)
-        refuted = checker.sieve.refuted(segments, 6, tau)
+        refuted = checker.screen.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
 
@@ -106,7 +106,7 @@ def test_segments_of_candidates():
 def test_more_instants_refute_more():
     checker, rng = checker_of(kind=FROM_REST, batch=64), np.random.default_rng(5)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
-    found = [checker.sieve.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
+    found = [checker.screen.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
 
 
@@ -120,7 +120,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
-        sizes.append(checker.sieve.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
+        sizes.append(checker.screen.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
         single_precision, _ = screen.smallest_tensions(
             checker.problem.robot,
             EFFECTIVE,

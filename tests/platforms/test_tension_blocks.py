@@ -31,7 +31,7 @@ G = 9.81
 @partial(jax.jit, static_argnames="kind")
 def _reach(segments, arcs, middles, axes, *, kind):
     middle = complex_bounds.middle_of(QUINTIC, middles)
-    return complex_bounds.reach(segments, arcs, middle, axes, kind)
+    return complex_bounds.ellipse_bounds(segments, arcs, middle, axes, kind)
 
 
 def reach_breaks(count, seed, kind, robot):
@@ -118,13 +118,13 @@ TIGHT = {"tension_min": 0.3, "tension_max": 4.0, "cable_speed_max": 2.0}
 
 def certifier_of(problem, kind):
     """A certifier whose work is not counted."""
-    return Certifier(problem, kind, batch=BATCH, count_instants=lambda count: None)
+    return Certifier(problem, kind, batch=BATCH, count_samples=lambda count: None)
 
 
-def bounds_of(certifier, problem, segments, arcs, blocks, *, order=0, margins=False, least=False):
+def bounds_of(certifier, problem, segments, arcs, blocks, *, order=0, margins=False, reduced=False):
     """Bounds on blocks, one a motion."""
     motions = segments, arcs, determinant_at_rest(problem, segments)
-    return certifier.bounds(order, blocks, motions, margins=margins, least=least)
+    return certifier.bounds(order, blocks, motions, margins=margins, reduced=least)
 
 
 def block_breaks(count, seed, kind, robot, limits):
@@ -137,7 +137,7 @@ def block_breaks(count, seed, kind, robot, limits):
     stop = np.minimum(start + rng.uniform(0.05, 0.4, count) / arcs, 1.0)
     # As margins need them, and as verdicts do, from rounded values.
     found, rough = (
-        bounds_of(certifier_of(problem, kind), problem, segments, arcs, Blocks(np.arange(count), start, stop), least=x)
+        bounds_of(certifier_of(problem, kind), problem, segments, arcs, Blocks(np.arange(count), start, stop), reduced=x)
         for x in (False, True)
     )
     broken, gaps = 0, []
@@ -170,7 +170,7 @@ def test_rounding_of_values_is_allowed_for():
     problem, start = problem_of(robot, limits_of(**TIGHT)), rng.uniform(0.0, 0.9, count)
     blocks = Blocks(np.arange(count), start, start + 0.1 / arcs)
     whole, rough = (
-        bounds_of(certifier_of(problem, FROM_REST), problem, segments, arcs, blocks, least=x) for x in (False, True)
+        bounds_of(certifier_of(problem, FROM_REST), problem, segments, arcs, blocks, reduced=x) for x in (False, True)
     )
     kappa = (whole.nodes[:, 0] * whole.nodes[:, 1]).max(0)
     more = rough.allowed - whole.allowed
@@ -200,7 +200,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
         contradicted += bool(proof.is_proved[i] and not (low > 0.0).all())
         contradicted += bool(proof.is_proved[i] and (proof.bound[i] > low + 1e-9).any())
         if proof.is_refuted[i]:
-            at = sampled(robot, segment, p, beta, proof.instant[i : i + 1], None).min()
+            at = sampled(robot, segment, p, beta, proof.refuted_tau[i : i + 1], None).min()
             # Between samples of a motion that is refuted there may be no sign of it, but not for long.
             contradicted += bool(not at < 0.0 or low.min() > 1e-3)
     undecided = ~proof.is_proved & ~proof.is_refuted
@@ -302,7 +302,7 @@ def determinant(matrices):
 
 @partial(jax.jit, static_argnames="kind")
 def _values(problem, items, *, kind):
-    return tension_blocks._taken(problem, jnp.ones(()), items, kind=kind, margins=False).values
+    return tension_blocks._interpolated(problem, jnp.ones(()), items, kind=kind, margins=False).values
 
 
 def rounding_used(count, seed, kind, robot):
@@ -368,7 +368,7 @@ def test_slacks_at_nodes_are_no_lower_than_they_are(limits, least):
     # The middle is a node.
     middle, half = np.concatenate(flat), 1e-4 / arcs[row]
     problem, blocks = problem_of(robot, limits and limits_of(**limits)), Blocks(row, middle - half, middle + half)
-    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, least=least)
+    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, reduced=least)
     tau, doubtful = blocks.times(chebyshev.nodes()[:, None]), 0
     for i, k in enumerate(row):
         true = sampled(robot, theirs[k], int(arcs[k]), betas[k], tau[:, i], limits)
@@ -386,12 +386,12 @@ def _rests(problem, items, *, kind):
     middle, half = complex_bounds.middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     z0 = problem.robot.gravity / segments.rate
     block = tension_blocks._Block(segments, platform_segment_lanes.squared_duration(segments, arcs), regular, z0)
-    now = complex_bounds.instant_beside(middle, segments.sense, arcs, 0.0 * half)
+    now = complex_bounds.phase_beside(middle, segments.sense, arcs, 0.0 * half)
     lengths = tension_blocks._lengths(problem.robot, platform_segment_lanes.state(segments, arcs, now, kind))
     radii, every = np.array(chebyshev.RADII), []
     for (along, aside), factor in zip(chebyshev.semi_axes(radii), chebyshev.remainders(radii), strict=True):
-        bounds = complex_bounds.reach(segments, arcs, middle, (along * half, aside * half), kind)
-        sizes = jnp.stack(tension_blocks._sizes(problem, block, bounds, along * half, lengths)[:7])
+        bounds = complex_bounds.ellipse_bounds(segments, arcs, middle, (along * half, aside * half), kind)
+        sizes = jnp.stack(tension_blocks._magnitude_bounds(problem, block, bounds, along * half, lengths)[:7])
         every.append(jnp.where(jnp.isnan(sizes), jnp.inf, sizes * factor))
     return jnp.min(jnp.stack(every), axis=0)
 
@@ -450,20 +450,20 @@ def test_planted_errors_in_bounds_are_found(monkeypatch, request, fault):
     if fault in ("no wrench", "remainder"):
         request.getfixturevalue("few_nodes")
     if fault == "less growth":
-        whole = complex_bounds.reach
+        whole = complex_bounds.ellipse_bounds
 
         def less(*given):
             found = whole(*given)
             return found._replace(omega=0.5 * found.omega, angular_acceleration=0.5 * found.angular_acceleration)
 
-        monkeypatch.setattr(complex_bounds, "reach", less)
+        monkeypatch.setattr(complex_bounds, "ellipse_bounds", less)
         assert (reach_breaks(200, 1, USUAL, ROBOTS["mssm"]) > 1.0).any()
     elif fault == "rounded polynomial":
         monkeypatch.setattr(chebyshev, "bernstein", lambda: np.eye(chebyshev.DEGREE + 1))
         assert block_breaks(400, 3, USUAL, ROBOTS["general"], None)[0]
     elif fault == "no wrench":
-        whole = tension_blocks._sizes
-        monkeypatch.setattr(tension_blocks, "_sizes", lambda *given: [1e-11 * x for x in whole(*given)])
+        whole = tension_blocks._magnitude_bounds
+        monkeypatch.setattr(tension_blocks, "_magnitude_bounds", lambda *given: [1e-11 * x for x in whole(*given)])
         assert remainders_used(24, 41, USUAL, ROBOTS["general"]) > 1.0
     else:
         plain = chebyshev.remainders

@@ -17,7 +17,7 @@ from cspr_jax.robots.statics.kernel_axes import centred
 from support.least_time import robot_of
 
 # Quick tests look at few intervals.
-QUICK = FreeSettings(intervals=12, instants=3)
+QUICK = FreeSettings(intervals=12, samples=3)
 
 
 class Judged:

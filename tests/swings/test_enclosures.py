@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.other_robots import on_balls, uncertain
 
-from cspr_jax.families.platforms.motions import rows as some_of
+from cspr_jax.families.platforms.platform_segment import take_segments as some_of
 from cspr_jax.families.swings.arcs import arcs_and_segments
 from cspr_jax.families.swings.hypocycloid import motion as point_motion
 from cspr_jax.families.swings.proof.enclosures import tolerated_by_point_masses

@@ -33,7 +33,7 @@ from cspr_jax.families.beziers.duration_roots import Ends
 from cspr_jax.families.beziers.durations import feasible_durations
 from cspr_jax.families.beziers.launches.launch_range import POPULATION, LaunchRange
 from cspr_jax.families.beziers.launches.launch_range import launch_range as search_launches
-from cspr_jax.families.beziers.launches.release_bounds import bounds_of
+from cspr_jax.families.beziers.launches.release import bounds_of
 from cspr_jax.families.beziers.margins import depths_of
 from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.families.beziers.verdicts import verdicts

@@ -23,7 +23,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import PointsOfPaths, Positive, QuaternionsOfPaths, RampTime
 from cspr_jax.families.paths.batch import least_times
-from cspr_jax.families.paths.geometry.path_specs import course_through
+from cspr_jax.families.paths.geometry.path_specs import path_through
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
@@ -148,7 +148,7 @@ def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternion
     elif quaternions is not None:
         raise InputError("quaternions", None, "must be absent for a point mass", problem="given")
     try:
-        return course_through(table, places, units).sections()
+        return path_through(table, places, units).sections()
     except InputError as error:
         raise InputError(f"paths[{i}], {error.key}", error.value, error.allowed, problem=error.problem) from error
 

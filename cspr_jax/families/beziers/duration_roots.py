@@ -50,8 +50,8 @@ def critical_durations(
 ) -> list[np.ndarray]:
     """Durations between which no cable tightens or falls slack, and no depth below the spools changes its sign."""
     # In units in which r, and with it the coefficients, are about 1.
-    size = np.abs(ends.end - ends.start).sum(1) + np.abs(ends.start).sum(1)
-    unit = size / gravity
+    extent = np.abs(ends.end - ends.start).sum(1) + np.abs(ends.start).sum(1)
+    unit = extent / gravity
     vectors = _vectors(ends, unit)
     polynomials = [*_of_cables(rows, arms, gravity, unit, vectors), *_of_depth(normal, vectors)]
     return [np.pi * np.sqrt(unit[i] * _positive_roots([table[i] for table in polynomials])) for i in range(len(unit))]
@@ -69,21 +69,21 @@ def _of_cables(
     rows: np.ndarray, arms: np.ndarray, gravity: float, unit: np.ndarray, vectors: list[np.ndarray]
 ) -> list[np.ndarray]:
     # Return pseudotensions times r at both ends, and the discriminants of the cubics.
-    square, slope, rest = vectors
+    square, linear, constant = vectors
     # r g, z down.
-    fall = np.zeros((len(unit), 3, 2))
-    fall[:, 2, 1] = gravity * unit
-    first = total(2.0 * square, -fall)
+    weight = np.zeros((len(unit), 3, 2))
+    weight[:, 2, 1] = gravity * unit
+    first = total(2.0 * square, -weight)
     moments = [
-        _cross(first, rest),
-        total(total(-_cross(slope, rest), 2.0 * _cross(square, slope)), -_cross(fall, slope)),
-        total(-4.0 * _cross(square, rest), -_cross(fall, square)),
-        -3.0 * _cross(square, slope),
+        _cross(first, constant),
+        total(total(-_cross(linear, constant), 2.0 * _cross(square, linear)), -_cross(weight, linear)),
+        total(-4.0 * _cross(square, constant), -_cross(weight, square)),
+        -3.0 * _cross(square, linear),
     ]
-    pulled = [first, -slope, -4.0 * square, 0.0 * square]
+    forces = [first, -linear, -4.0 * square, 0.0 * square]
     polynomials = []
     for row, arm in zip(rows, arms, strict=True):
-        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, moments, strict=True)]
+        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(forces, moments, strict=True)]
         scale = sum(np.abs(x).max(-1, keepdims=True) for x in f)
         f = [x / np.where(scale > 0.0, scale, 1.0) for x in f]
         even, odd = total(f[0], f[2]), total(f[1], f[3])
@@ -92,8 +92,8 @@ def _of_cables(
 
 
 def _of_depth(normal: np.ndarray, vectors: list[np.ndarray]) -> list[np.ndarray]:
-    square, slope, rest = (_dot(normal, x) for x in vectors)
-    return [total(product(slope, slope), -4.0 * product(square, rest))]
+    square, linear, constant = (_dot(normal, x) for x in vectors)
+    return [total(product(linear, linear), -4.0 * product(square, constant))]
 
 
 def _discriminant(f: list[np.ndarray]) -> np.ndarray:
@@ -115,8 +115,8 @@ def _discriminant(f: list[np.ndarray]) -> np.ndarray:
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     # (n, 3, d) of tables.
-    rows = [(1, 2), (2, 0), (0, 1)]
-    return np.stack([product(a[:, i], b[:, j]) - product(a[:, j], b[:, i]) for i, j in rows], axis=1)
+    pairs = [(1, 2), (2, 0), (0, 1)]
+    return np.stack([product(a[:, i], b[:, j]) - product(a[:, j], b[:, i]) for i, j in pairs], axis=1)
 
 
 def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:

@@ -26,12 +26,12 @@ from cspr_jax.verification.proved_verdicts import Verdicts
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Halvings of the stretch between a duration that is feasible and one that is not: as many as float64 has digits.
+# Halvings of the interval between a duration that is feasible and one that is not: as many as float64 has digits.
 HALVINGS = 60
 # Durations tried under limits in each interval that keeps every cable taut, in geometric progression up to so many
 # times the first.
 TRIED, WIDEST = 129, 100.0
-# Longest duration over the time that the largest speed or acceleration of the cables takes for the way.
+# Longest duration over the time that the largest speed or acceleration of the cables takes for the distance.
 AMPLE = 20.0
 
 
@@ -82,17 +82,17 @@ def _between(roots: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     # Choose one duration below all roots of a segment, one between any two, one above all; number the segment of each.
     tests = []
     for critical in roots:
-        known = critical if len(critical) else np.array([1.0])
-        tests.append(np.concatenate([[0.5 * known[0]], np.sqrt(known[1:] * known[:-1]), [2.0 * known[-1]]]))
+        times = critical if len(critical) else np.array([1.0])
+        tests.append(np.concatenate([[0.5 * times[0]], np.sqrt(times[1:] * times[:-1]), [2.0 * times[-1]]]))
     return np.repeat(np.arange(len(roots)), [len(x) for x in tests]), np.concatenate(tests)
 
 
 def _intervals(is_in_segment: np.ndarray, is_good: np.ndarray, changes: np.ndarray, edges: np.ndarray) -> np.ndarray:
     # Each change is one end of an interval; the last test of a segment says whether it is open.
-    places = np.flatnonzero(is_in_segment)
+    indices = np.flatnonzero(is_in_segment)
     inside = [float(edge) for change, edge in zip(changes, edges, strict=True) if is_in_segment[change]]
-    starts = [0.0] if is_good[places[0]] else []
-    ends = [np.inf] if is_good[places[-1]] else []
+    starts = [0.0] if is_good[indices[0]] else []
+    ends = [np.inf] if is_good[indices[-1]] else []
     return np.array([*starts, *inside, *ends]).reshape(-1, 2)
 
 
@@ -111,7 +111,7 @@ def least_duration(
 
         return least_proved_duration(problem, ends, z0, slowest(problem, np.concatenate([ends.start, ends.end])))
 
-    def judged(times: np.ndarray, allowed: Problem = problem) -> Verdicts:
+    def verdicts_of(times: np.ndarray, allowed: Problem = problem) -> Verdicts:
         many = Ends(*(np.repeat(x, len(times), axis=0) for x in ends))
         motions = Bezier(many.start, many.middles(times), many.end, times, np.full(len(times), z0))
         return verdicts_within(allowed, motions)
@@ -120,15 +120,15 @@ def least_duration(
     for allowed, (first, last) in itertools.product((problem, touchable(problem)), intervals):
         widest = max(WIDEST * first, slowest(problem, np.concatenate([ends.start, ends.end])))
         times = np.geomspace(first, min(last, widest), TRIED)
-        good = np.flatnonzero(judged(times, allowed).verdict == 0)
+        good = np.flatnonzero(verdicts_of(times, allowed).verdict == 0)
         if len(good):
-            return _narrowed(partial(judged, allowed=allowed), times, int(good[0]))
+            return _narrowed(partial(verdicts_of, allowed=allowed), times, int(good[0]))
     # Nothing is feasible, so the duration that comes nearest stands in.
-    size = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
-    unit = np.sqrt(max(size, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
+    extent = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
+    unit = np.sqrt(max(extent, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
     times = times[np.isfinite(times)]
-    judgements = judged(times)
+    judgements = verdicts_of(times)
     if limits_set(problem.limits):
         return float(times[_nearest(judgements)])
     return float(times[np.argmax(np.nan_to_num(judgements.margin, nan=-np.inf))])
@@ -143,8 +143,8 @@ def _nearest(judgements: Verdicts) -> int:
 
 def slowest(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> float:
     """Duration that is long enough for the limits of speeds and accelerations."""
-    way = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    way = way or float(spool_radius(problem.robot))
+    distance = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    distance = distance or float(spool_radius(problem.robot))
     limits = problem.limits
     speeds, accelerations = (
         [float(np.min(np.asarray(limit))) for limit in pair if limit is not None]
@@ -153,15 +153,17 @@ def slowest(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> float:
             (limits.cable_acceleration_max, limits.acceleration_max),
         )
     )
-    times = [way / speed for speed in speeds] + [math.sqrt(way / acceleration) for acceleration in accelerations]
+    times = [distance / speed for speed in speeds] + [
+        math.sqrt(distance / acceleration) for acceleration in accelerations
+    ]
     return AMPLE * max(times, default=0.0)
 
 
-def _narrowed(judged, times: np.ndarray, first: int) -> float:
+def _narrowed(verdicts_of, times: np.ndarray, first: int) -> float:
     good, bad = times[first], times[max(first - 1, 0)]
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
         if middle in (good, bad):
             break
-        good, bad = (middle, bad) if judged(np.array([middle])).verdict[0] == 0 else (good, middle)
+        good, bad = (middle, bad) if verdicts_of(np.array([middle])).verdict[0] == 0 else (good, middle)
     return float(good)

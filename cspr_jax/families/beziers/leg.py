@@ -31,7 +31,7 @@ ABOVE_SHORTEST = 1.0 + 1e-6
 
 
 class _Chosen(NamedTuple):
-    # Places, durations (None: the least, one after the other) and first control point; the release, if there is one.
+    # Positions, durations (None: the least, one after the other) and first control point; the release, if there is one.
     points: np.ndarray
     durations: list[float | None]
     first: np.ndarray
@@ -40,7 +40,7 @@ class _Chosen(NamedTuple):
 
 
 class Beziers(Leg):
-    """Any places, joined by Bezier segments; see `Leg`."""
+    """Any positions, joined by Bezier segments; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, of which a segment has none."""
@@ -53,7 +53,7 @@ class Beziers(Leg):
         self._at = None if launch is None or not 0 <= launch.segment - waypoints.first < len(self) else launch.segment
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
-        """Join the places; see `Leg.join`."""
+        """Join the positions; see `Leg.join`."""
         points, frame = self._points(problem, z0), self.waypoints.frame
         # The depth is that of P0, else that of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
@@ -96,8 +96,8 @@ class Beziers(Leg):
             question = _question(waypoints, launch, points, depth, float(problem.robot.gravity))
             best = launched(problem, question, durations, launch.choose)
             first = segments_of(best.sequence, jnp.asarray(best.durations)).middle[0]
-            places, times, first = jax.tree.map(np.asarray, (best.sequence.points, best.durations, first))
-            return _Chosen(places, times.tolist(), first, float(best.release), float(best.time))
+            positions, times, first = jax.tree.map(np.asarray, (best.sequence.points, best.durations, first))
+            return _Chosen(positions, times.tolist(), first, float(best.release), float(best.time))
         control_point = waypoints.plan_file.first_control_point if waypoints.first == 0 else None
         first = points[0] if control_point is None else np.asarray(waypoints.frame.inward(control_point))
         if waypoints.plan_file.least == "total":
@@ -146,14 +146,14 @@ class Beziers(Leg):
         times = np.asarray(motions.time)[:, None]
         ends = end_acceleration(motions.middle, motions.end, times)
         starts = (np.pi / times[:1]) ** 2 * first[None]
-        sizes = np.linalg.norm(np.concatenate([starts, ends]), axis=1)
-        for i in np.flatnonzero(sizes > AT_REST * float(problem.robot.gravity)).tolist():
+        norms = np.linalg.norm(np.concatenate([starts, ends]), axis=1)
+        for i in np.flatnonzero(norms > AT_REST * float(problem.robot.gravity)).tolist():
             if self.waypoints.poses[i].rest:
                 raise ConfigError(
                     self.waypoints.path,
                     f"{self.waypoints.name(i)}.rest = {shown(True)}: must be absent where the acceleration is "
                     "not zero: "
-                    f"it is {sizes[i]:.3g} m/s^2",
+                    f"it is {norms[i]:.3g} m/s^2",
                 )
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Float
 
 Items = dict[str, Any]
-# Blocks that are looked at together.
+# Blocks that are computed together.
 TOGETHER = 1 << 14
 
 
@@ -34,8 +34,8 @@ def limit_slacks(
     problem: Problem, motions: Bezier, kappa: Float[np.ndarray, "n n_cables 4"], is_below: Bool[np.ndarray, "n"]
 ) -> Proved:
     """Smallest slacks of the limits that are given, in their order."""
-    rows, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
-    slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
+    limits, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
+    slacks = [_SLACKS[limit.name](problem, getattr(problem.limits, limit.name)) for limit in limits]
     count = len(is_below)
     full = MinimumBlocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
 
@@ -47,8 +47,8 @@ def limit_slacks(
         low, attained = (np.stack(x, axis=1) for x in zip(*pairs, strict=True))
         return low, attained
 
-    proved = smallest(full, count, values, np.ones(len(rows)), batch_size=TOGETHER)
-    unknown = ~is_below[:, None] & np.array([row.quantity == "tension" for row in rows])[None]
+    proved = smallest(full, count, values, np.ones(len(limits)), batch_size=TOGETHER)
+    unknown = ~is_below[:, None] & np.array([limit.quantity == "tension" for limit in limits])[None]
     return Proved(*(np.where(unknown, -np.inf, x) for x in proved))
 
 
@@ -66,23 +66,23 @@ def _of_limit(slack: Callable[[Items], Any], ends: list[Items], during: Items) -
 def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> dict[str, np.ndarray]:
     # Return coefficients by powers of c: (n, n_cables, d) or (n, 1, d).
     a = np.asarray(problem.robot.base_points)
-    square, slope, rest = powers(motions.start, motions.middle, motions.end)
+    square, linear, constant = powers(motions.start, motions.middle, motions.end)
     u = ((np.pi / motions.time) ** 2)[:, None, None]
-    place = np.stack([rest, slope, square], axis=-1)
-    second_derivative = u * np.stack([2.0 * square, -slope, -4.0 * square], axis=-1)
-    rays = np.repeat(-place[:, None], len(a), axis=1)
+    position = np.stack([constant, linear, square], axis=-1)
+    second_derivative = u * np.stack([2.0 * square, -linear, -4.0 * square], axis=-1)
+    rays = np.repeat(-position[:, None], len(a), axis=1)
     rays[..., 0] += a
-    radial_rate = np.stack([slope, 2.0 * square], axis=-1)[:, None]
+    radial_rate = np.stack([linear, 2.0 * square], axis=-1)[:, None]
     per_time = product(u, np.array([1.0, 0.0, -1.0]))
     along = _dot(rays, radial_rate)
     rows, arms = (np.asarray(x)[0] for x in jax.jit(adjugate)(problem.robot))
-    level = np.einsum("i,nij->nj", np.cross(arms, a[0]) - rows, place)
+    level = np.einsum("i,nij->nj", np.cross(arms, a[0]) - rows, position)
     level[:, 0] += rows @ a[0]
     return {
         "square": _dot(rays, rays),
         "kappa": kappa,
         "determinant": np.where(is_below[:, None], level, [1.0, 0.0, 0.0])[:, None],
-        "depth": place[:, 2:],
+        "depth": position[:, 2:],
         "rate": product(per_time, product(along, along)),
         "speed": product(per_time, _dot(radial_rate, radial_rate)),
         "acceleration": _dot(second_derivative[:, None], second_derivative[:, None]),

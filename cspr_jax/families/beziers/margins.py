@@ -2,8 +2,8 @@
 
 Pseudotensions are (rows + p x arms) (p'' - g), bilinear in p and p'' - g, both of which are quadratic in c, the cosine
 of pi tau. The fourth power cancels, since its factors are parallel: what is left is a cubic in c for every triangle of
-spools (19), whose smallest value on [-1, 1] is at an end or where its slope is zero. The depth below the spools is a
-quadratic. All this holds for a point mass on two cables in a plane likewise.
+spools (19), whose smallest value on [-1, 1] is at an end or where its derivative is zero. The depth below the spools is
+a quadratic. All this holds for a point mass on two cables in a plane likewise.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cspr_jax.robots.statics.force_balance import adjugate, pseudotensions
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Rounding errors are below so many units of the sum of the sizes of all terms.
+# Rounding errors are below so many units of the sum of the magnitudes of all terms.
 EPSILONS = 64.0
 
 
@@ -46,43 +46,43 @@ class Margins(NamedTuple):
 def cubics(robot: PointMassRobot, motion: Bezier) -> Float[Array, "n_cables 4"]:
     """Pseudotensions over their value at rest in P0, by powers of c = cos(pi tau), (19) and (20)."""
     rows, arms = adjugate(robot)
-    square, slope, rest = powers(motion.start, motion.middle, motion.end)
+    square, linear, constant = powers(motion.start, motion.middle, motion.end)
     u = (np.pi / motion.time) ** 2
-    fall = jnp.zeros_like(square).at[2].set(robot.gravity)
-    first = 2.0 * u * square - fall
+    weight = jnp.zeros_like(square).at[2].set(robot.gravity)
+    first = 2.0 * u * square - weight
     moments = jnp.stack(
         [
-            jnp.cross(first, rest),
-            -u * jnp.cross(slope, rest) + 2.0 * u * jnp.cross(square, slope) - jnp.cross(fall, slope),
-            -4.0 * u * jnp.cross(square, rest) - jnp.cross(fall, square),
-            -3.0 * u * jnp.cross(square, slope),
+            jnp.cross(first, constant),
+            -u * jnp.cross(linear, constant) + 2.0 * u * jnp.cross(square, linear) - jnp.cross(weight, linear),
+            -4.0 * u * jnp.cross(square, constant) - jnp.cross(weight, square),
+            -3.0 * u * jnp.cross(square, linear),
         ]
     )
-    pulled = jnp.stack([first, -u * slope, -4.0 * u * square, jnp.zeros_like(square)])
-    return (rows @ pulled.T + arms @ moments.T) / _at_rest(robot, motion.z0)[:, None]
+    forces = jnp.stack([first, -u * linear, -4.0 * u * square, jnp.zeros_like(square)])
+    return (rows @ forces.T + arms @ moments.T) / _at_rest(robot, motion.z0)[:, None]
 
 
 @jax.jit
 def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Float[Array, "3"]:
     """Depth below the spools over z0, by powers of c = cos(pi tau)."""
-    square, slope, rest = powers(motion.start, motion.middle, motion.end)
-    return jnp.stack([rest, slope, square]) @ plane_normal(robot) / motion.z0
+    square, linear, constant = powers(motion.start, motion.middle, motion.end)
+    return jnp.stack([constant, linear, square]) @ plane_normal(robot) / motion.z0
 
 
 @jax.jit
 def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
     """Smallest pseudotensions and depth of a segment, (22) to (25); the last with "min" in place of "max"."""
     rows, arms = adjugate(robot)
-    square, slope, rest = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
-    place = square + slope + rest
-    force = (np.pi / motion.time) ** 2 * (6.0 * square + slope) + robot.gravity
-    terms = force * (jnp.sum(jnp.abs(rows), axis=1) + place * jnp.sum(jnp.abs(arms), axis=1))
-    epsilon = EPSILONS * jnp.finfo(place.dtype).eps
+    square, linear, constant = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
+    position = square + linear + constant
+    force = (np.pi / motion.time) ** 2 * (6.0 * square + linear) + robot.gravity
+    terms = force * (jnp.sum(jnp.abs(rows), axis=1) + position * jnp.sum(jnp.abs(arms), axis=1))
+    epsilon = EPSILONS * jnp.finfo(position.dtype).eps
     return Margins(
         smallest_cubic(cubics(robot, motion).T),
         smallest_quadratic(depth_quadratic(robot, motion)),
         epsilon * terms / jnp.abs(_at_rest(robot, motion.z0)),
-        epsilon * place * jnp.sum(jnp.abs(plane_normal(robot))) / jnp.abs(motion.z0),
+        epsilon * position * jnp.sum(jnp.abs(plane_normal(robot))) / jnp.abs(motion.z0),
     )
 
 
@@ -95,7 +95,8 @@ def depths_of(robot: PointMassRobot, starts: Float[np.ndarray, "n 3"]) -> Float[
 def smallest_cubic(powers_of_c: Float[Array, "4 ..."]) -> Float[Array, "..."]:
     """Smallest value of cubics on [-1, 1].
 
-    The zeros of the slope are found without cancellation; where one is not in the interval, an end stands in for it.
+    The zeros of the derivative are found without cancellation; where one is not in the interval, an end stands in for
+    it.
     """
     f0, f1, f2, f3 = powers_of_c
     discriminant = f2**2 - 3.0 * f3 * f1
@@ -115,7 +116,7 @@ def smallest_quadratic(powers_of_c: Float[Array, "3 ..."]) -> Float[Array, "..."
 
 
 def _inside(c: Array) -> Array:
-    # Derivatives of a smallest value do not see that its place moves: there the slope is zero.
+    # Derivatives of a smallest value do not depend on how its argument moves: there the derivative is zero.
     return lax.stop_gradient(jnp.clip(jnp.where(c * 0.0 == 0.0, c, 1.0), -1.0, 1.0))
 
 

@@ -57,11 +57,11 @@ class Bezier:
     def state(self, tau: Array) -> State:
         """State, (17) and (18); see `Motion.state`."""
         sine, c = elementary.sincospi(jnp.asarray(tau, float))
-        square, slope, rest = powers(self.start, self.middle, self.end)
+        square, linear, rest = powers(self.start, self.middle, self.end)
         w = np.pi / self.time
-        velocity = -w * sine * (2.0 * square * c + slope)
-        acceleration = w**2 * (2.0 * square - slope * c - 4.0 * square * c**2)
-        return State(square * c**2 + slope * c + rest, velocity, acceleration)
+        velocity = -w * sine * (2.0 * square * c + linear)
+        acceleration = w**2 * (2.0 * square - linear * c - 4.0 * square * c**2)
+        return State(square * c**2 + linear * c + rest, velocity, acceleration)
 
     def breaks(self) -> Array:
         """No breaks; see `Motion.breaks`."""
@@ -85,12 +85,12 @@ def _bounds(blocks: tuple[Bezier, AffineBounds]) -> StateBounds:
     def one(curve: Bezier, tau: AffineBounds) -> StateBounds:
         # 2 c^2 is 1 + cos(2 pi tau), 2 c sin(pi tau) is sin(2 pi tau).
         (sine, c), (sine2, c2) = sincospi(tau), sincospi(tau * 2.0)
-        square, slope, rest = powers(curve.start, curve.middle, curve.end)
+        square, linear, rest = powers(curve.start, curve.middle, curve.end)
         w = np.pi / curve.time
         return StateBounds(
-            c2 * (0.5 * square) + c * slope + (rest + 0.5 * square),
-            (sine2 * square + sine * slope) * -w,
-            (c * slope + c2 * (2.0 * square)) * -(w**2),
+            c2 * (0.5 * square) + c * linear + (rest + 0.5 * square),
+            (sine2 * square + sine * linear) * -w,
+            (c * linear + c2 * (2.0 * square)) * -(w**2),
         )
 
     return jax.vmap(one)(*blocks)

@@ -1,10 +1,10 @@
-"""Durations of Bezier segments on more cables than degrees of freedom: looked for by samples, decided by proofs.
+"""Durations of Bezier segments on more cables than degrees of freedom: searched for by samples, decided by proofs.
 
-Where the control points do not depend on the duration, what the cables must supply at each place is affine in
-u = (pi / T)^2. Tensions within limits for two values of u share out to tensions for those between them, and speeds and
-accelerations of cables fall as T grows: the feasible durations are one interval, and between two that are proved all
-are. Where the second control point follows from the acceleration at the start, (15), the curve changes with T, and
-only the durations that are tried are decided.
+Where the control points do not depend on the duration, what the cables must supply at each point is affine in
+u = (pi / T)^2. Tensions within limits for two values of u can be interpolated to tensions for those between them, and
+speeds and accelerations of cables fall as T grows: the feasible durations are one interval, and between two that are
+proved all are. Where the second control point follows from the acceleration at the start, (15), the curve changes with
+T, and only the durations that are tried are decided.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from cspr_jax.families.beziers.duration_roots import Ends
 from cspr_jax.families.beziers.motion import Bezier
-from cspr_jax.families.beziers.redundant_verdicts import instant_slacks, proofs, verdicts_and_proofs
+from cspr_jax.families.beziers.redundant_verdicts import proofs, slacks_at, verdicts_and_proofs
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
 BATCH, SAMPLES = 512, 65
 # Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far
-# as the way; and those of a finer look between the neighbours of the best one, as often as it takes, up to so often.
+# as the distance; and those of a finer search between the neighbours of the best one, as often as it takes, up to so
+# often.
 TRIED, SHORTEST, LONGEST = 257, 1e-2, 100.0
 FINER, ROUNDS = 33, 4
-# Share of a duration to which ends of intervals are narrowed.
+# Fraction of a duration to which ends of intervals are narrowed.
 CLOSE = 1e-9
 
 
@@ -42,7 +43,7 @@ CLOSE = 1e-9
 def _sampled(problem: Problem, motions: Bezier) -> jax.Array:
     # Return the smallest slack of each segment, (n,).
     tau = jnp.linspace(0.0, 1.0, SAMPLES)
-    minimum = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min())(motions)
+    minimum = jax.vmap(lambda motion: jax.vmap(lambda t: slacks_at(problem, motion, t))(tau).min())(motions)
     return jnp.where(jnp.isnan(minimum), -jnp.inf, minimum)
 
 
@@ -79,11 +80,11 @@ def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> Float[np.nda
     if ends.middle_change.any():
         return None
     segment = _Segment(Problem(robot, NO_LIMITS, named("quintic")), ends, z0)
-    times, values = _looked_at(segment, robot, ends, 0.0)
+    times, values = _sampled_durations(segment, robot, ends, 0.0)
     first = _first_proved(segment, times, values)
     if first is None:
         return np.empty((0, 2))
-    low = _least(segment, times, first)
+    low = _least_duration(segment, times, first)
     if segment.is_static():
         return np.array([[low, np.inf]])
     positive = np.flatnonzero(values > 0.0).tolist()
@@ -94,17 +95,21 @@ def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> Float[np.nda
 def least_proved_duration(problem: Problem, ends: Ends, z0: float, slowest: float) -> float:
     """Least feasible duration of a segment."""
     segment = _Segment(problem, ends, z0)
-    times, values = _looked_at(segment, problem.robot, ends, slowest)
+    times, values = _sampled_durations(segment, problem.robot, ends, slowest)
     first = _first_proved(segment, times, values)
-    return float(times[values.argmax()]) if first is None else _least(segment, times, first)
+    return float(times[values.argmax()]) if first is None else _least_duration(segment, times, first)
 
 
-def _looked_at(segment: _Segment, robot: PointMassRobot, ends: Ends, slowest: float) -> tuple[np.ndarray, np.ndarray]:
-    # Return durations and their smallest sampled slacks: the finer look where the coarse one sees none above zero.
-    size, gravity = float(spool_radius(robot)), float(robot.gravity)
-    way = max(float(np.linalg.norm(ends.end - ends.start) + np.linalg.norm(ends.middle - ends.start)), 1e-9 * size)
-    longest = LONGEST * np.sqrt(max(way, size) / gravity)
-    times = np.geomspace(SHORTEST * np.sqrt(way / gravity), max(longest, slowest), TRIED)
+def _sampled_durations(
+    segment: _Segment, robot: PointMassRobot, ends: Ends, slowest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return durations and their smallest sampled slacks: the finer ones where none of the coarse ones is above zero.
+    radius, gravity = float(spool_radius(robot)), float(robot.gravity)
+    distance = max(
+        float(np.linalg.norm(ends.end - ends.start) + np.linalg.norm(ends.middle - ends.start)), 1e-9 * radius
+    )
+    longest = LONGEST * np.sqrt(max(distance, radius) / gravity)
+    times = np.geomspace(SHORTEST * np.sqrt(distance / gravity), max(longest, slowest), TRIED)
     values = segment.sampled(times)
     for _ in range(ROUNDS):
         if (values > 0.0).any():
@@ -119,5 +124,5 @@ def _first_proved(segment: _Segment, times: np.ndarray, values: np.ndarray) -> i
     return next((i for i in np.flatnonzero(values > 0.0).tolist() if segment.is_proved(times[i])), None)
 
 
-def _least(segment: _Segment, times: np.ndarray, first: int) -> float:
+def _least_duration(segment: _Segment, times: np.ndarray, first: int) -> float:
     return segment.edge(float(times[first]), float(times[first - 1])) if first else 0.0

@@ -30,8 +30,8 @@ from cspr_jax.verification.proved_verdicts import Verdicts
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Segments that are proved together, and the largest share of the weight a cable that counts for searches: on cables
-# that pull against each other without largest tensions it has no bound.
+# Segments that are proved together, and the largest margin over the weight a cable that counts for searches: on cables
+# that tighten each other without largest tensions it has no bound.
 TOGETHER, LARGEST = 64, 1e6
 
 
@@ -40,8 +40,8 @@ def proofs(problem: Problem, motions: Bezier, *, at_rest: bool = False) -> list[
 
     def bounds(first: int, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
         states = many_bounds(motions, motion + first, start, end)
-        still = jax.tree.map(np.zeros_like, states.velocity)
-        return states._replace(velocity=still, acceleration=still) if at_rest else states
+        zero = jax.tree.map(np.zeros_like, states.velocity)
+        return states._replace(velocity=zero, acceleration=zero) if at_rest else states
 
     firsts, times = range(0, len(motions.time), TOGETHER), np.asarray(motions.time)
     parts = [proofs_of(problem, partial(bounds, i), times[i : i + TOGETHER]) for i in firsts]
@@ -52,20 +52,20 @@ def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, Fl
     """Verdicts of segments, with their proofs."""
     motions = jax.tree.map(np.asarray, motions)
     count = len(motions.time)
-    leaves = np.concatenate([leaf.reshape(count, -1) for leaf in jax.tree.leaves(motions)], axis=1)
-    rows = np.flatnonzero(np.isfinite(leaves).all(1) & (motions.time > 0.0))
+    leaves = np.concatenate([x.reshape(count, -1) for x in jax.tree.leaves(motions)], axis=1)
+    valid = np.flatnonzero(np.isfinite(leaves).all(1) & (motions.time > 0.0))
     verdict = np.full(count, Verdict.NOT_FINITE.value, FLAGS)
-    margin, bound, room = (np.full(count, np.nan) for _ in range(3))
+    margin, bound, limit_margin = (np.full(count, np.nan) for _ in range(3))
     each = np.empty(count, object)
-    each[rows] = proofs(problem, jax.tree.map(lambda x: x[rows], motions))
-    for i in rows.tolist():
+    each[valid] = proofs(problem, jax.tree.map(lambda x: x[valid], motions))
+    for i in valid.tolist():
         short = summary(each[i], float(motions.z0[i]))
-        verdict[i], margin[i], bound[i], room[i] = short.verdict, short.margin, short.bound, short.room
-    return Verdicts(verdict, margin, bound, room), each
+        verdict[i], margin[i], bound[i], limit_margin[i] = short.verdict, short.margin, short.bound, short.room
+    return Verdicts(verdict, margin, bound, limit_margin), each
 
 
-def instant_slacks(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
-    """Slacks at one instant, for searches."""
+def slacks_at(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
+    """Slacks at one time, for searches."""
     robot, state = problem.robot, motion.state(tau)
     matrix, wrench = robot.wrench_matrix(state), robot.inertial_wrench(state)
     margin = centred(matrix, wrench, *tension_range(robot, problem.limits))[1]

@@ -110,7 +110,7 @@ def joined_segments(
         if i + 1 < len(durations):
             acceleration = end_acceleration(middle, ends.end, time)
             ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, acceleration)
-    return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *motions), intervals)
+    return Joined(jax.tree.map(lambda *parts: np.concatenate(parts), *motions), intervals)
 
 
 def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:

@@ -26,18 +26,18 @@ from cspr_jax.robots.model.point_mass import spool_radius
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Shortest and longest duration looked at, over that of a fall by the robot's size.
+# Shortest and longest duration that is tried, over that of a fall by the robot's radius.
 SHORTEST, LONGEST = 0.1, 40.0
-# Instants of a segment at which limits are sampled; they are proved afterwards.
+# Samples of a segment at which limits are kept; they are proved afterwards.
 SAMPLES = 65
 
 
 class Anchored(NamedTuple):
-    """Sequence of segments, one of whose second control points is known; numbers of NumPy or of jax.
+    """Sequence of segments, one of whose second control points is given; numbers of NumPy or of jax.
 
     Fields:
         points: (n + 1, 3) from the centroid of the spools, z down, m.
-        segment: () number of the segment whose control point is known.
+        segment: () number of the segment whose control point is given.
         control_point: (3,) m.
         z0: () depth at which slacks are normalised, m.
     """
@@ -56,8 +56,8 @@ def segments_of(sequence: Anchored, durations: Float[Array, "n"]) -> Bezier:
     added = (starts - ends) / r[:, None]
     gained = jnp.cumsum(added, axis=0) - added
     at = sequence.segment
-    known = (sequence.control_point - starts[at]) / r[at]
-    middles = starts + r[:, None] * (known[None] + gained - gained[at][None])
+    acceleration = (sequence.control_point - starts[at]) / r[at]
+    middles = starts + r[:, None] * (acceleration[None] + gained - gained[at][None])
     return Bezier(starts, middles, ends, durations, jnp.full_like(durations, sequence.z0))
 
 
@@ -68,9 +68,9 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     """
     tau = jnp.linspace(0.0, 1.0, samples)
     if problem.robot.n_cables > problem.robot.dof:
-        from cspr_jax.families.beziers.redundant_verdicts import instant_slacks
+        from cspr_jax.families.beziers.redundant_verdicts import slacks_at
 
-        sampled = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min(0))
+        sampled = jax.vmap(lambda motion: jax.vmap(lambda t: slacks_at(problem, motion, t))(tau).min(0))
         return sampled(segments).ravel()
 
     def one(motion):
@@ -84,7 +84,7 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     return jax.vmap(one)(segments).ravel()
 
 
-def judged(problem: Problem, segments: Bezier) -> Verified:
+def verified(problem: Problem, segments: Bezier) -> Verified:
     """Judgement of a sequence, proved."""
     judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
     worst = smallest_slacks(problem, judgements).min()
@@ -92,7 +92,7 @@ def judged(problem: Problem, segments: Bezier) -> Verified:
 
 
 def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:
-    """Logarithms of the shortest and of the longest duration that searches look at."""
+    """Logarithms of the shortest and of the longest duration that searches try."""
     unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
     longest = max(LONGEST * unit, slowest(problem, points))
     return float(np.log(SHORTEST * unit)), float(np.log(longest))
@@ -106,11 +106,11 @@ def _parts(arguments, x: Array) -> tuple[Array, Array]:
 
 def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> Float[np.ndarray, "n"]:
     """Durations whose sum is least."""
-    known = np.array([1.0 if time is None else time for time in durations])
+    given = np.array([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None])
 
     def times(x: np.ndarray) -> np.ndarray:
-        all_durations = known.copy()
+        all_durations = given.copy()
         all_durations[free] = np.exp(x)
         return all_durations
 
@@ -118,9 +118,9 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
     shortest, longest = (np.full(len(free), bound) for bound in bounds)
     logarithms = constrained_minimum(
         _parts,
-        (problem, sequence, jnp.asarray(known), free),
+        (problem, sequence, jnp.asarray(given), free),
         shortest,
         longest,
-        lambda x: judged(problem, segments_of(sequence, jnp.asarray(times(x)))),
+        lambda x: verified(problem, segments_of(sequence, jnp.asarray(times(x)))),
     )
     return times(logarithms)

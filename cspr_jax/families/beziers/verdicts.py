@@ -23,7 +23,7 @@ from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack,
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Segments judged together: of a plan, and of arrays.
+# Segments computed together: of a plan, and of arrays.
 BATCH, MANY = 256, 8192
 
 
@@ -48,40 +48,41 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
 
         return verdicts_and_proofs(problem, motions)[0]
 
-    def judged(allowed: Problem, rows: np.ndarray) -> Verdicts:
-        return verdicts_within(allowed, jax.tree.map(lambda x: np.asarray(x)[rows], motions))
+    def verdicts_of(allowed: Problem, indices: np.ndarray) -> Verdicts:
+        return verdicts_within(allowed, jax.tree.map(lambda x: np.asarray(x)[indices], motions))
 
-    return with_touched(problem, verdicts_within(problem, motions), judged)
+    return with_touched(problem, verdicts_within(problem, motions), verdicts_of)
 
 
 def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
     """Verdicts, on as many cables as degrees of freedom, of which none that touches a limit is feasible."""
-    size = BATCH if len(motions.time) <= BATCH else MANY
-    margins = in_batches(partial(_margins, problem.robot), motions, batch_size=size)
+    batch = BATCH if len(motions.time) <= BATCH else MANY
+    margins = in_batches(partial(_margins, problem.robot), motions, batch_size=batch)
     slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
     doubt = np.concatenate([margins.taut_rounding, margins.below_rounding[:, None]], axis=1)
     flags = [Verdict.SLACK_CABLE.value] * margins.taut.shape[1] + [Verdict.ABOVE_SPOOLS.value]
-    bound, room = slack - doubt, np.full(len(slack), np.inf)
+    bound, limit_margin = slack - doubt, np.full(len(slack), np.inf)
     broken = np.bitwise_or.reduce(np.where(slack < -doubt, flags, 0), axis=1)
     is_open = ~(bound > 0.0).all(1)
-    rows = limits_set(problem.limits)
+    limits = limits_set(problem.limits)
     finite = np.isfinite(slack).all(1)
-    if rows:
-        kappa = in_batches(partial(_pseudotensions, problem.robot), motions, batch_size=size)
+    if limits:
+        kappa = in_batches(partial(_pseudotensions, problem.robot), motions, batch_size=batch)
         proved = limit_slacks(problem, motions, kappa, bound[:, -1] > 0.0)
-        known = np.isfinite(proved.attained)
+        is_known = np.isfinite(proved.attained)
         broken |= np.bitwise_or.reduce(
-            np.where(known & (proved.attained < -FORMULAS_UNDECIDED), [row.flag.value for row in rows], 0), axis=1
+            np.where(is_known & (proved.attained < -FORMULAS_UNDECIDED), [limit.flag.value for limit in limits], 0),
+            axis=1,
         )
         is_open |= ~(proved.bound > FORMULAS_UNDECIDED).all(1)
         shown = [
-            plain_slack(row.name, x, (*SPEEDS, "acceleration_max"))
-            for row, x in zip(rows, proved.attained.T, strict=True)
+            plain_slack(limit.name, x, (*SPEEDS, "acceleration_max"))
+            for limit, x in zip(limits, proved.attained.T, strict=True)
         ]
-        room = np.min(shown, axis=0)
+        limit_margin = np.min(shown, axis=0)
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0))
     verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(FLAGS)
-    return Verdicts(verdict, slack.min(1), bound.min(1), room)
+    return Verdicts(verdict, slack.min(1), bound.min(1), limit_margin)
 
 
 def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray, "n"]:
@@ -89,6 +90,6 @@ def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray,
     robot, margin = problem.robot, judgements.margin
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
-    # Above the spools the room under limits of tensions is not known, and the depth decides.
+    # Above the spools the margin of limits of tensions is not known, and the depth decides.
     minimum = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
     return np.where(np.isnan(minimum), -np.inf, minimum)

@@ -2,8 +2,8 @@
 
 Between poses a motion is a quintic B-spline of normalised time, with four continuous derivatives, so that tensions and
 their rates are continuous. Its control points, its duration and the accelerations at the poses are found by an
-interior-point method on the limits at many instants, from several starts. The proof of any motion then says where
-limits are missed between instants; there they are tightened, and the search goes on. For all robots within an
+interior-point method on the limits at many samples, from several starts. The proof of any motion then says where
+limits are missed between samples; there they are tightened, and the search goes on. For all robots within an
 uncertainty they are tightened by what these lose. The orientation is a Rodrigues vector from an orientation half-way,
 so that the motion is a spline of quaternions as all others are.
 
@@ -14,11 +14,10 @@ Files, each importing only from those above it:
     closed_forms   motions of other families, from which searches begin, too
     problem        poses, limits and objective of a search, and how bounds tighten
     static_poses   poses that no motion can have
-    contacts       planes that keep bodies apart where a motion brings them too near
-    robust         bounds that leave room for all robots within an uncertainty
+    contacts       planes that separate bodies where a motion brings them too near
+    robust         bounds that leave slack for all robots within an uncertainty
     proofs         motions tightened until they are proved, for the planned robot or for all
     free_motion    the fastest motion through poses, proved
-    followed       splines that follow motions of other families
     no_slower      motions of other families in place of what a search finds, where they are faster
     neighbours     the best motions of many pairs of poses, from few starts and from neighbours' motions
     batch          the fastest motions of many pairs of poses, tightened until they are proved

@@ -23,9 +23,9 @@ from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, ans
 
 # Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
 # proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
-# and are some parts in a thousand faster. Instants of each interval.
-MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
-# Number of the ways in which searches of plans go on that are tried on one mesh.
+# and are some parts in a thousand faster. Samples of each interval.
+MESHES, SAMPLES = ((12, 32), (16, 28), (24, 36)), 4
+# Number of the weights and softnesses with which searches of plans go on that are tried on one mesh.
 TRIED = 2
 
 
@@ -33,12 +33,12 @@ class ManyFreeMotions(NamedTuple):
     """The fastest motions that were found between pairs of poses.
 
     Fields:
-        rows: (m,) numbers of the pairs for which the search met all limits at the instants that it looks at.
+        indices: (m,) numbers of the pairs for which the search met all limits at its samples.
         motions: m of them.
         answers: of these: proved, refuted or undecided.
     """
 
-    rows: np.ndarray
+    indices: np.ndarray
     motions: list[Spline]
     answers: ProvedAnswers
 
@@ -55,28 +55,28 @@ def free_motions(
         for i, motion, proof in _on_mesh([questions[k] for k in left], mesh) if left else ():
             if left[i] not in best or not proof.verdict:
                 best[left[i]] = motion, proof
-    rows = sorted(best)
-    motions = [best[k][0] for k in rows]
-    answers = answers_of([best[k][1] for k in rows], np.array([float(one.knots[-1]) for one in motions]))
+    indices = sorted(best)
+    motions = [best[k][0] for k in indices]
+    answers = answers_of([best[k][1] for k in indices], np.array([float(one.knots[-1]) for one in motions]))
     judge_all_robots(problem, answers, motions, scene)
-    return ManyFreeMotions(np.array(rows, int), motions, answers)
+    return ManyFreeMotions(np.array(indices, int), motions, answers)
 
 
 def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
     # Numbers of pairs, and their motions with proofs.
     coarse, fine = (
-        _stacked([question.tasks(intervals, instants) for question in questions])
-        for intervals, instants in zip(mesh, (FEWEST, INSTANTS), strict=True)
+        _stacked([question.tasks(intervals, samples) for question in questions])
+        for intervals, samples in zip(mesh, (FEWEST, SAMPLES), strict=True)
     )
     search = Neighbours(coarse, [question.poses.z0 for question in questions])
     search.search()
-    rows = np.flatnonzero(np.isfinite(search.duration))
-    if not len(rows):
+    found = np.flatnonzero(np.isfinite(search.duration))
+    if not len(found):
         return
-    begun = _refined(coarse.basis, fine.taken(rows), search.controls[rows], search.duration[rows], FINE[0][0])
-    unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE[:TRIED])
-    rows = rows[is_optimal]
-    yield from zip(rows.tolist(), *_proved(questions, rows, fine.taken(rows), unknowns.taken(is_optimal)), strict=True)
+    begun = _refined(coarse.basis, fine.take(found), search.controls[found], search.duration[found], FINE[0][0])
+    unknowns, is_optimal = _first_optima(fine.take(found), begun, FINE[:TRIED])
+    found = found[is_optimal]
+    yield from zip(found.tolist(), *_proved(questions, found, fine.take(found), unknowns.take(is_optimal)), strict=True)
 
 
 def _stacked(tasks: Sequence[Tasks]) -> Tasks:
@@ -96,13 +96,13 @@ def _refined(source: Basis, tasks: Tasks, controls: np.ndarray, duration: np.nda
 
 def _first_optima(tasks: Tasks, start: Unknowns, levels: Iterable[tuple[float, float]]) -> tuple[Unknowns, np.ndarray]:
     # For each task the optimum of the first search that converges, with its barrier and softness; whether there is one.
-    unknowns, is_optimal = Unknowns(*(leaf.copy() for leaf in start)), np.zeros(len(start.duration), bool)
+    unknowns, is_optimal = Unknowns(*(values.copy() for values in start)), np.zeros(len(start.duration), bool)
     for barrier, softness in levels:
-        rows = np.flatnonzero(~is_optimal)
-        if len(rows):
-            part = tasks.taken(rows)
-            result = optima(part, again(part, start.taken(rows), barrier), barrier, softness)
-            _put(unknowns, result.unknowns, result.is_optimal, rows, is_optimal)
+        open_tasks = np.flatnonzero(~is_optimal)
+        if len(open_tasks):
+            part = tasks.take(open_tasks)
+            result = optima(part, again(part, start.take(open_tasks), barrier), barrier, softness)
+            _put(unknowns, result.unknowns, result.is_optimal, open_tasks, is_optimal)
     return unknowns, is_optimal
 
 
@@ -110,58 +110,58 @@ def _put(
     unknowns: Unknowns, others: Unknowns, are_optimal: np.ndarray, rows: np.ndarray, is_optimal: np.ndarray
 ) -> None:
     # Replace the unknowns of some motions, in place.
-    for leaf, values in zip(unknowns, others, strict=True):
-        leaf[rows] = values
+    for array, values in zip(unknowns, others, strict=True):
+        array[rows] = values
     is_optimal[rows] = are_optimal
 
 
 def _proved(
-    questions: Sequence[FreeQuestion], rows: np.ndarray, tasks: Tasks, unknowns: Unknowns
+    questions: Sequence[FreeQuestion], indices: np.ndarray, tasks: Tasks, unknowns: Unknowns
 ) -> tuple[list[Spline], list[MotionProof]]:
     # Motions, tightened and searched again until all are proved, or no more helps.
-    problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in rows.tolist()]
+    problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in indices.tolist()]
 
     def motion(k: int) -> Spline:
         one = np.array([k])
-        return motions_of(tasks.taken(one), unknowns.taken(one), depths[k])[0]
+        return motions_of(tasks.take(one), unknowns.take(one), depths[k])[0]
 
-    motions, proofs = [motion(k) for k in range(len(rows))], np.empty(len(rows), object)
-    left = np.arange(len(rows))
+    motions, proofs = [motion(k) for k in range(len(indices))], np.empty(len(indices), object)
+    left = np.arange(len(indices))
     for number in range(1, ROUNDS + 1):
         if len(left):
-            several = SplineBatch([motions[k] for k in left.tolist()])
-            parts = several.bounds, several.durations, scene, several.jumps
+            splines = SplineBatch([motions[k] for k in left.tolist()])
+            parts = splines.bounds, splines.durations, scene, splines.jumps
             proofs[left] = proofs_of(problem, *parts, intervals=False)
         left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
         tighter = None
         if len(left) and number < ROUNDS:
             tighter = tightened(
-                questions[0], tasks.taken(left), slacks_of(questions[0], [motions[k] for k in left.tolist()]), number
+                questions[0], tasks.take(left), slacks_of(questions[0], [motions[k] for k in left.tolist()]), number
             )
         if tighter is None:
             break
-        further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON[:TRIED])
+        further, is_optimal = _first_optima(tighter, unknowns.take(left), ON[:TRIED])
         left = left[is_optimal]
         tasks.low[left], tasks.high[left] = tighter.low[is_optimal], tighter.high[is_optimal]
-        for leaf, values in zip(unknowns, further, strict=True):
-            leaf[left] = values[is_optimal]
+        for array, values in zip(unknowns, further, strict=True):
+            array[left] = values[is_optimal]
         for k in left.tolist():
             motions[k] = motion(k)
-    for k in range(len(rows)):
+    for k in range(len(indices)):
         if proofs[k].verdict & CONTACTS:
             one = np.array([k])
-            clear = _clear(questions[rows[k]], tasks.taken(one), unknowns.taken(one))
+            clear = _clear(questions[indices[k]], tasks.take(one), unknowns.take(one))
             motions[k], proofs[k] = clear or (motions[k], proofs[k])
     return motions, proofs.tolist()
 
 
 def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
-    # The motion whose bodies are kept apart, one by one, since planes belong to one motion; None without a proof.
+    # The motion whose bodies are separated, one by one, since planes belong to one motion; None without a proof.
     proof = proved(question, tasks, unknowns)
     if proof.is_stopped:
         raise KeyboardInterrupt
     if not proof.answers.feasible.all():
         return None
-    several = SplineBatch(proof.motions)
-    parts = several.bounds, several.durations, question.scene, several.jumps
+    splines = SplineBatch(proof.motions)
+    parts = splines.bounds, splines.durations, question.scene, splines.jumps
     return proof.motions[0], proofs_of(question.problem, *parts, intervals=False)[0]

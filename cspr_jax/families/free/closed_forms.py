@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.free.poses import BACK, FreePoses
-from cspr_jax.families.free.search.instants import coordinates
+from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.motion.leg import Leg
@@ -17,7 +17,7 @@ from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.proved_answers import ProvedAnswers
 
-# Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
+# Part of the robot's radius, and of the speed of a fall from its height, by which motions may miss poses.
 NEAR = 1e-9
 # Rodrigues vectors beyond which no search begins.
 FAR = 10.0
@@ -42,9 +42,9 @@ class ClosedForm(NamedTuple):
 
     def segment(self, i: int) -> "ClosedForm":
         """The motion of one segment alone."""
-        rows = slice(i, i + 1)
+        part = slice(i, i + 1)
         answers = None if self.answers is None else self.answers.rows(np.arange(i, i + 1))
-        return ClosedForm(self.family, self.motions[rows], self.is_feasible[rows], self.duration[rows], answers)
+        return ClosedForm(self.family, self.motions[part], self.is_feasible[part], self.duration[part], answers)
 
 
 def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> list[ClosedForm]:
@@ -65,12 +65,12 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
 
 def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
     # Tell whether motions that are proved begin and end as the poses say; accelerations may differ.
-    size = float(spool_radius(problem.robot))
-    speed = np.sqrt(size * float(problem.robot.gravity))
+    radius = float(spool_radius(problem.robot))
+    speed = np.sqrt(radius * float(problem.robot.gravity))
     for i in np.flatnonzero(form.is_feasible).tolist():
         state = states_at(form.motions[i], np.array([0.0, 1.0]))
         ends = slice(i, i + 2)
-        far = np.abs(state.position - poses.positions[ends]).max() > NEAR * size
+        far = np.abs(state.position - poses.positions[ends]).max() > NEAR * radius
         fast = np.abs(state.velocity - poses.velocities[ends]).max() > NEAR * speed
         rotated = poses.quaternions is not None and (
             np.abs(np.sum(state.quaternion * poses.quaternions[ends], axis=1)).min() < 1.0 - NEAR
@@ -84,22 +84,22 @@ def controls_of(single: Tasks, motion: Motion) -> np.ndarray:
     """Control points of a spline that is near a motion."""
     along, about = coordinates(single.robot.pattern)
     state = states_at(motion, single.basis.averages)
-    places = np.asarray(state.position)[:, along]
+    samples = np.asarray(state.position)[:, along]
     if len(about):
         turning = products(np.asarray(state.quaternion), single.references[0, 0][None] * BACK)
         with np.errstate(divide="ignore", invalid="ignore"):
-            places = np.concatenate([places, turning[:, 1 + about] / turning[:, :1]], axis=1)
-    return single.basis.fit @ places
+            samples = np.concatenate([samples, turning[:, 1 + about] / turning[:, :1]], axis=1)
+    return single.basis.fit @ samples
 
 
-def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
+def form_starts(single: Tasks, indices: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
     """Starts of a search from closed forms."""
-    places = [(i, form, k) for form in forms for i, k in enumerate(rows.tolist()) if form.is_feasible[k]]
-    controls = np.zeros((len(places), 1, single.basis.controls, single.places.shape[-1]))
-    for n, (_, form, k) in enumerate(places):
-        controls[n, 0] = controls_of(single.taken(np.array([k])), form.motions[k])
+    feasible = [(i, form, k) for form in forms for i, k in enumerate(indices.tolist()) if form.is_feasible[k]]
+    controls = np.zeros((len(feasible), 1, single.basis.controls, single.ends.shape[-1]))
+    for n, (_, form, k) in enumerate(feasible):
+        controls[n, 0] = controls_of(single.take(np.array([k])), form.motions[k])
     turns = np.abs(controls[..., len(coordinates(single.robot.pattern)[0]) :])
     is_near = (turns < FAR).all(axis=(1, 2, 3))
-    task = np.array([i for i, *_ in places], int)
-    duration = np.array([form.duration[k] for _, form, k in places], float)
+    task = np.array([i for i, *_ in feasible], int)
+    duration = np.array([form.duration[k] for _, form, k in feasible], float)
     return Starts(task[is_near], controls[is_near], duration[is_near, None])

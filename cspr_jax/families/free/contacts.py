@@ -1,6 +1,6 @@
-"""Planes in the space of coordinates that keep bodies apart where a motion brings them too near.
+"""Planes in the space of coordinates that separate bodies where a motion brings them too near.
 
-The clearance of two bodies is linearised about the motion at each instant at which it is small; searched again within
+The clearance of two bodies is linearised about the motion at each sample at which it is small; searched again within
 these planes, the motion gives new ones. Clearances of solid bodies are negative inside. Cables without thickness, and
 cables over a platform's face, have a side on which they are, that of the poses: the sign of the distance of their
 lines, or of the height of the spool over the face.
@@ -15,9 +15,9 @@ import numpy as np
 
 from cspr_jax.families.free.poses import quaternions_of
 from cspr_jax.families.free.problem import FreeQuestion, more
-from cspr_jax.families.free.search.instants import coordinates
+from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.interior_point import BARRIERS, Ending, OutOfTime, again, optima, started
-from cspr_jax.families.free.search.starts import BENT, bulge, ways
+from cspr_jax.families.free.search.starts import DEFLECTION, deflection_profile, deflections
 from cspr_jax.families.free.search.tasks import OUTER, ClearancePlanes, Tasks, Unknowns
 from cspr_jax.robots.contacts.clearance import ContactPair, Scene, clearances
 from cspr_jax.robots.contacts.contact_bodies import bodies_of, contact_pairs, default_scene
@@ -26,10 +26,10 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.criteria import has_extent
 from cspr_jax.verification.piece_slacks import PieceSlacks
 
-# Over the size of the robot: clearance up to which bodies are kept apart, clearance that they keep, at least, and by
-# how much more at most each time; step of difference quotients.
-NEAR, APART, MOST, STEP = 0.1, 1e-4, 0.02, 1e-6
-# By how much more than lines motions are bent round what is in their way, those of platforms, whose searches take long,
+# Over the robot's radius: clearance up to which bodies are separated, smallest clearance that they keep, and its
+# largest increase each time; step of difference quotients.
+NEAR, MIN_CLEARANCE, MAX_INCREASE, STEP = 0.1, 1e-4, 0.02, 1e-6
+# By how much more than lines motions are deflected round obstacles, those of platforms, whose searches take long,
 # once; how much slower they begin, the softness with which searches from them begin, and weight of barriers and
 # softness with which they go on; how many each has.
 WIDER, SLOWER, SOFTNESS, GO_ON, SEARCHES = (1.0, 2.0), 1.5, 10.0, (1e-3, 1e-1), 4
@@ -43,40 +43,42 @@ class _Gap(NamedTuple):
     need: float
 
 
-def apart(
+def separated(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
 ) -> tuple[Tasks, Unknowns] | None:
-    """Bounds that keep bodies apart where a motion brings them too near."""
+    """Bounds that separate bodies where a motion brings them too near."""
     missed = -_clearances(question, slacks).min(0, initial=np.inf)
     if not (missed > 0.0).any():
         return None
-    size = float(spool_radius(tasks.robot))
-    minimum = {} if tasks.planes is None else dict(tasks.planes.least)
+    radius = float(spool_radius(tasks.robot))
+    minimum = {} if tasks.planes is None else dict(tasks.planes.minimum)
     for k in np.flatnonzero(missed > 0.0).tolist():
-        minimum[k] = minimum.get(k, APART * size) + min(more(number) * float(missed[k]), MOST * size)
-    return _parted(question, tasks, unknowns, minimum, NEAR * size)
+        minimum[k] = minimum.get(k, MIN_CLEARANCE * radius) + min(
+            more(number) * float(missed[k]), MAX_INCREASE * radius
+        )
+    return _parted(question, tasks, unknowns, minimum, NEAR * radius)
 
 
 def around(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks
 ) -> tuple[Tasks, Unknowns] | None:
-    """The best motion of those that lead round the obstacles in the way of one, bent to all sides."""
-    is_met, size = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
+    """The best motion of those that lead round the obstacles that one meets, deflected to all sides."""
+    is_met, radius = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
     _, pairs = _bodies(question)
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
         return None
-    segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
-    minimum = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
-    deviation = Unknowns(*map(np.concatenate, zip(*_bent(tasks, unknowns, segments), strict=True)))
-    return _clear(question, tasks.taken(np.zeros(len(deviation.duration), int)), deviation, minimum)
+    segments = np.any(is_met.reshape(len(tasks.ends[0]), -1), axis=1)
+    minimum = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), MIN_CLEARANCE * radius)
+    deviation = Unknowns(*map(np.concatenate, zip(*_deflected(tasks, unknowns, segments), strict=True)))
+    return _clear(question, tasks.take(np.zeros(len(deviation.duration), int)), deviation, minimum)
 
 
 def _clear(
-    question: FreeQuestion, tasks: Tasks, deviation: Unknowns, least: dict[int, float]
+    question: FreeQuestion, tasks: Tasks, deviation: Unknowns, minimum: dict[int, float]
 ) -> tuple[Tasks, Unknowns] | None:
-    # The best of the motions on the sides of bent ones, if one is clear at all instants: planes about one after the
+    # The best of the motions on the sides of deflected ones, if one is clear at all samples: planes about one after the
     # other.
-    within, begun = _parted(question, tasks, deviation, least, np.inf)
+    within, begun = _parted(question, tasks, deviation, minimum, np.inf)
     begun = started(within, within.controls(begun), begun.duration)
     level, until = (BARRIERS[0], SOFTNESS), question.settings.until
     best, cost = None, np.inf
@@ -85,19 +87,19 @@ def _clear(
         if result.is_stopped and time.monotonic() <= until:
             raise KeyboardInterrupt
         is_kept = result.is_optimal & within.objective.keeps_limits(result.unknowns.level)
-        within, unknowns = within.taken(is_kept), result.unknowns.taken(is_kept)
+        within, unknowns = within.take(is_kept), result.unknowns.take(is_kept)
         if not is_kept.any():
             break
-        further, begun = _parted(question, within, unknowns, least, np.inf)
+        further, begun = _parted(question, within, unknowns, minimum, np.inf)
         is_clear = np.all(begun.values[..., further.n_limited :] > 0.0, axis=(1, 2, 3, 4))
         costs = np.where(is_clear, within.cost(unknowns), np.inf)
         if costs.min() < cost:
-            rows, cost = np.array([costs.argmin()]), costs.min()
-            best = within.taken(rows), unknowns.taken(rows)
+            cheapest, cost = np.array([costs.argmin()]), costs.min()
+            best = within.take(cheapest), unknowns.take(cheapest)
         if result.is_stopped or is_clear.all():
             break
-        within, level = further.taken(~is_clear), GO_ON
-        begun = again(within, begun.taken(~is_clear), level[0])
+        within, level = further.take(~is_clear), GO_ON
+        begun = again(within, begun.take(~is_clear), level[0])
     if best is None and result.is_stopped:
         raise OutOfTime
     return best
@@ -119,54 +121,58 @@ def _bodies(question: FreeQuestion) -> tuple[Scene, tuple[ContactPair, ...]]:
     return scene, contact_pairs(robot, scene)
 
 
-def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
-    # Motions that are bent along some of their segments (s,).
-    (along, about), chords = coordinates(tasks.robot.pattern), tasks.places[0, :, 1] - tasks.places[0, :, 0]
+def _deflected(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
+    # Motions that are deflected along some of their segments (s,).
+    (along, about), chords = coordinates(tasks.robot.pattern), tasks.ends[0, :, 1] - tasks.ends[0, :, 0]
     lengths = np.maximum(np.linalg.norm(chords[:, : len(along)], axis=1), NEAR * float(spool_radius(tasks.robot)))
     second_derivative = (
-        BENT * (tasks.basis.fit @ bulge(tasks.basis.averages))[:, None] * (lengths * segments)[:, None, None]
+        DEFLECTION
+        * (tasks.basis.fit @ deflection_profile(tasks.basis.averages))[:, None]
+        * (lengths * segments)[:, None, None]
     )
     for wider in WIDER[:1] if len(about) else WIDER:
-        for directions in list(zip(*(ways(chord, along) for chord in chords), strict=True))[1:]:
+        for directions in list(zip(*(deflections(chord, along) for chord in chords), strict=True))[1:]:
             inner = unknowns.inner + wider * (second_derivative * np.array(directions)[:, None])[None, :, OUTER:-OUTER]
             yield unknowns._replace(inner=inner, duration=SLOWER * unknowns.duration)
 
 
 def _parted(
-    question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, least: dict[int, float], near: float
+    question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, minimum: dict[int, float], near: float
 ) -> tuple[Tasks, Unknowns]:
-    # Planes about a motion where clearances are below `near`, m, by the clearances that meetings keep, m.
-    (scene, pairs), size = _bodies(question), float(spool_radius(tasks.robot))
-    places = tasks.basis.places(tasks.controls(unknowns))[..., 0, :]
-    linear = [_linear(tasks, places, _gap(question, scene, pairs[k])) for k in least]
-    values, slopes = np.stack([one[0] for one in linear], axis=-1), np.stack([one[1] for one in linear], axis=-2)
+    # Planes about a motion where clearances are below `near`, m, by the clearances that pairs of bodies keep, m.
+    (scene, pairs), radius = _bodies(question), float(spool_radius(tasks.robot))
+    samples = tasks.basis.evaluate(tasks.controls(unknowns))[..., 0, :]
+    linear = [_linear(tasks, samples, _gap(question, scene, pairs[k])) for k in minimum]
+    values, gradients = np.stack([one[0] for one in linear], axis=-1), np.stack([one[1] for one in linear], axis=-2)
     is_near = values < near
-    slopes, values = np.where(is_near[..., None], slopes, 0.0) / size, np.where(is_near, values, 0.0) / size
-    planes = ClearancePlanes(slopes, values - np.sum(slopes * places[..., None, :], axis=-1), tuple(least.items()))
-    low = np.where(is_near, np.array(list(least.values())) / size, -np.inf)
+    gradients, values = np.where(is_near[..., None], gradients, 0.0) / radius, np.where(is_near, values, 0.0) / radius
+    planes = ClearancePlanes(
+        gradients, values - np.sum(gradients * samples[..., None, :], axis=-1), tuple(minimum.items())
+    )
+    low = np.where(is_near, np.array(list(minimum.values())) / radius, -np.inf)
     return tasks.within(planes, low), tasks.beside(unknowns, values)
 
 
-def _linear(tasks: Tasks, places: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
-    # Clearances (l, s, m, n), m, and their slopes (l, s, m, n, d), by the coordinates; NaN where they say nothing.
-    def values(where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        quaternions = quaternions_of(tasks, where)
-        flat = where.reshape(-1, where.shape[-1])
+def _linear(tasks: Tasks, samples: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
+    # Clearances (l, s, m, n), m, and their gradients (l, s, m, n, d), by the coordinates; NaN where they say nothing.
+    def values(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        quaternions = quaternions_of(tasks, points)
+        flat = points.reshape(-1, points.shape[-1])
         positions = np.zeros((len(flat), 3))
         along = np.array(PATTERNS[tasks.robot.pattern].forces, int)
         positions[:, along] = flat[:, : len(along)]
         rotated = None if quaternions is None else quaternions.reshape(-1, 4)
         value, is_near = gap.of_poses(positions, rotated)
-        return value.reshape(where.shape[:-1]), is_near.reshape(where.shape[:-1])
+        return value.reshape(points.shape[:-1]), is_near.reshape(points.shape[:-1])
 
-    (middle, is_near), steps = values(places), STEP * np.eye(places.shape[-1])
-    slopes = [(values(places + step)[0] - values(places - step)[0]) / (2.0 * STEP) for step in steps]
-    side = np.ones((*places.shape[:2], 1, 1))
+    (middle, is_near), steps = values(samples), STEP * np.eye(samples.shape[-1])
+    gradients = [(values(samples + step)[0] - values(samples - step)[0]) / (2.0 * STEP) for step in steps]
+    side = np.ones((*samples.shape[:2], 1, 1))
     if gap.has_sides:
-        ends = np.sign(values(tasks.places)[0])
+        ends = np.sign(values(tasks.ends)[0])
         is_kept = (ends[..., 0] == ends[..., 1]) & (ends[..., 0] != 0.0)
         side = np.where(is_kept, ends[..., 0], np.nan)[..., None, None]
-    return np.where(is_near, side * middle - gap.need, np.nan), side[..., None] * np.stack(slopes, axis=-1)
+    return np.where(is_near, side * middle - gap.need, np.nan), side[..., None] * np.stack(gradients, axis=-1)
 
 
 def _gap(question: FreeQuestion, scene: Scene, meeting: ContactPair) -> _Gap:
@@ -176,12 +182,12 @@ def _gap(question: FreeQuestion, scene: Scene, meeting: ContactPair) -> _Gap:
     if kind == "platform" and scene.body is None:
         return _Gap(_over_face(question, scene, k), True, 0.0)
     # A scene in which nothing else can meet.
-    rows = [max(k, 0)]
+    cable = [max(k, 0)]
     alone = dataclasses.replace(
         scene,
-        base_points=scene.base_points[rows],
-        platform_points=scene.platform_points[rows],
-        diameters=scene.diameters[rows],
+        base_points=scene.base_points[cable],
+        platform_points=scene.platform_points[cable],
+        diameters=scene.diameters[cable],
         pairs=(),
         obstacles=() if kind == "platform" else (scene.obstacles[other],),
         body=None if kind == "obstacle" else scene.body,
@@ -212,8 +218,8 @@ def _between_lines(scene: Scene, k: int, other: int) -> Callable:
         u, v = (_rays(scene, i, positions, turns) for i in (k, other))
         normal = np.cross(u, v)
         square = np.sum(normal**2, axis=1)
-        shares = [np.sum(np.cross(start, ray) * normal, axis=1) for ray in (v, u)]
-        is_inside = (square > 0.0) & np.all([(fraction > 0.0) & (fraction < square) for fraction in shares], axis=0)
+        fractions = [np.sum(np.cross(start, ray) * normal, axis=1) for ray in (v, u)]
+        is_inside = (square > 0.0) & np.all([(fraction > 0.0) & (fraction < square) for fraction in fractions], axis=0)
         with np.errstate(invalid="ignore", divide="ignore"):
             return normal @ start / np.sqrt(square), is_inside
 

@@ -28,7 +28,7 @@ FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
-# this part of its duration: by what the intervals are divided, and the softness; instants of each interval. The last
+# this part of its duration: by what the intervals are divided, and the softness; samples of each interval. The last
 # one, on few intervals, is for those for which no start has led to any.
 SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0)), 3, 1e-3
 # Part of the time after which searches of segments end once each has a motion: the rest is for all together, and for
@@ -72,7 +72,7 @@ class FreeMotion:
         answers: of them: proved, refuted or undecided.
         energy: (n,) integral of the sum of the squares of the tensions, N^2 s, of the segments.
         level: (n,) of the objective, as `objectives` has it.
-        is_optimal: whether the search met all limits at the instants that it looks at.
+        is_optimal: whether the search met all limits at its samples.
         is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
         parts: best motions along the segments by themselves.
@@ -111,11 +111,11 @@ def free_motion(
         best, is_stopped = _begun(question), False
     else:
         best, is_stopped = _searched(question, () if before is None else before.parts, forms, lines)
-    tasks, optimum = question.tasks(settings.intervals, question.instants), None
-    for fraction, way in TOGETHER if all(one.is_optimal for one in best) else ():
-        tasks = question.tasks(2 * round(0.5 * settings.intervals / fraction), question.instants)
+    tasks, optimum = question.tasks(settings.intervals, question.samples), None
+    for fraction, option in TOGETHER if all(one.is_optimal for one in best) else ():
+        tasks = question.tasks(2 * round(0.5 * settings.intervals / fraction), question.samples)
         try:
-            optimum = first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])], settings.until)
+            optimum = first_optimum(tasks, [(_together(tasks, best, FINE[option][0]), *FINE[option])], settings.until)
         except OutOfTime:
             is_stopped = True
             break
@@ -158,18 +158,18 @@ def _searched(
             k not in best or not (best[k].is_optimal if is_last else best[k].is_shared) or (number == 1 and bool(forms))
             for k in range(count)
         ]
-        rows = np.flatnonzero(is_left)
-        if not len(rows) or (best and time.monotonic() > (enough if _all_optimal(best) else until)):
-            return list(best.values()), bool(len(rows))
+        open_segments = np.flatnonzero(is_left)
+        if not len(open_segments) or (best and time.monotonic() > (enough if _all_optimal(best) else until)):
+            return list(best.values()), bool(len(open_segments))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
         single = segments_of(question.tasks(settings.intervals // fraction, FEWEST))
-        begun = form_starts(single, rows, forms) if forms else _starts(question, single, rows, lines)
+        begun = form_starts(single, open_segments, forms) if forms else _starts(question, single, open_segments, lines)
         if not len(begun.task):
             break
-        lanes, ending = single.taken(rows[begun.task]), Ending(until, enough, begun.task)
+        lanes, ending = single.take(open_segments[begun.task]), Ending(until, enough, begun.task)
         unknowns = started(lanes, begun.controls, begun.duration)
         result = optima(lanes, unknowns, softness=softness, ending=ending, keeps=True)
-        _keep(best, rows, begun.task, lanes, result)
+        _keep(best, open_segments, begun.task, lanes, result)
         if result.is_stopped:
             if not _all_optimal(best) and time.monotonic() < until:
                 raise KeyboardInterrupt
@@ -178,7 +178,7 @@ def _searched(
 
 
 def _starts(question: FreeQuestion, single: Tasks, chosen: np.ndarray, lines: Sequence[ClosedForm]) -> Starts:
-    usual = starts(single.taken(chosen), question.poses.z0, question.settings.starts)
+    usual = starts(single.take(chosen), question.poses.z0, question.settings.starts)
     return joined_starts([usual, form_starts(single, chosen, lines)])
 
 
@@ -193,12 +193,14 @@ def _all_optimal(best: dict[int, SegmentMotion]) -> bool:
     return all(one.is_optimal for one in best.values())
 
 
-def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:
+def _keep(
+    best: dict[int, SegmentMotion], segments: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima
+) -> None:
     # Keeps what is better than before. Starts of different searches that lead to the same motion agree, too.
     controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
     is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
     costs = np.where(is_optimal, costs, np.inf)
-    for i, k in enumerate(rows.tolist()):
+    for i, k in enumerate(segments.tolist()):
         lanes_of = np.flatnonzero(of_task == i)
         if not len(lanes_of):
             continue
@@ -206,9 +208,9 @@ def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray,
         nearest = lanes_of[start]
         before = best[k].cost if k in best else np.inf
         minimum = min(costs[nearest], before)
-        room = minimum + SAME * abs(minimum)
-        agreeing = set(np.flatnonzero(np.isfinite(costs[lanes_of]) & (costs[lanes_of] <= room)).tolist())
-        if np.isfinite(before) and before <= room:
+        allowed = minimum + SAME * abs(minimum)
+        agreeing = set(np.flatnonzero(np.isfinite(costs[lanes_of]) & (costs[lanes_of] <= allowed)).tolist())
+        if np.isfinite(before) and before <= allowed:
             agreeing.add(best[k].start)
         if k not in best or costs[nearest] < before:
             duration = float(result.unknowns.duration[nearest, 0])

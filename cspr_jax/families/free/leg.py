@@ -118,7 +118,7 @@ class FreeMotions(Leg):
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)
-        # Segments have nothing in common if all accelerations are known.
+        # Segments have nothing in common if all accelerations are given.
         is_separate = waypoints.plan_file.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
@@ -175,9 +175,9 @@ class FreeMotions(Leg):
     @property
     def _settings(self) -> FreeSettings:
         # With the end of a search that begins now.
-        keys = self.waypoints.plan_file
-        until = np.inf if keys.search_time is None else time.monotonic() + keys.search_time
-        return FreeSettings(keys.objective or "time", keys.duration_max, keys.starts, until)
+        spec = self.waypoints.plan_file
+        until = np.inf if spec.search_time is None else time.monotonic() + spec.search_time
+        return FreeSettings(spec.objective or "time", spec.duration_max, spec.starts, until)
 
     def warnings(self, problem: Problem) -> list[str]:
         """A search that came to nothing, or was stopped; see `Leg.warnings`."""
@@ -261,13 +261,13 @@ class FreeMotions(Leg):
         if isinstance(problem.robot, PlatformRobot):
             quaternions = pose_quaternions(waypoints, positions)
         accelerations = np.full((len(positions), 3 if quaternions is None else 6), np.nan)
-        known = waypoints.plan_file.end_accelerations
-        if known == "swing":
+        given = waypoints.plan_file.end_accelerations
+        if given == "swing":
             accelerations[:] = 0.0
             accelerations[:, :3] = -float(problem.robot.gravity) / z0 * (positions - rest_point(z0))
-        elif isinstance(known, list):
+        elif isinstance(given, list):
             accelerations[:] = 0.0
-            accelerations[:, :3] = waypoints.frame.rotated(np.array(known[waypoints.first : waypoints.last + 1], float))
+            accelerations[:, :3] = waypoints.frame.rotated(np.array(given[waypoints.first : waypoints.last + 1], float))
         accelerations[[pose.rest for pose in waypoints.poses]] = 0.0
         rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in waypoints.poses])
         middle = z0 if np.isfinite(z0) else float(positions[:, 2].mean())

@@ -1,4 +1,4 @@
-"""Maps of the least durations of free motions from one place to each target."""
+"""Maps of the least durations of free motions from one position to each target."""
 
 import numpy as np
 from jax import Array
@@ -24,12 +24,12 @@ class FreeMap(ProvedMap):
 
     from_rest = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse a rest without a place, and cables without a largest tension; see `ProvedMap`."""
-        super().__init__(robot_file, keys, file)
-        start = keys.trajectory.start
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
+        """Refuse a rest without a position, and cables without a largest tension; see `ProvedMap`."""
+        super().__init__(robot_file, spec, file)
+        start = spec.trajectory.start
         self._rests = start is not None and start.rest
-        if self._rests and keys.axes.z0 is None:
+        if self._rests and spec.axes.z0 is None:
             raise ConfigError(file, "axes.z0 is missing: depth of P0, m, in which trajectory.from.rest = true is")
         try:
             check_searched(self._problem)
@@ -40,15 +40,17 @@ class FreeMap(ProvedMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         ends, z0 = self._targets(cells), cells.get("z0")
         starts = rest_point(np.asarray(z0)) if self._rests else self._start_places(cells)
-        still, begins = self._still(ends), self._still(starts)
+        at_ends, at_starts = self._at_rest(ends), self._at_rest(starts)
         stays = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE
-        out = np.array([(a.verdict | b.verdict) & OF_PLACES for a, b in zip(still.proof, begins.proof, strict=True)])
-        columns = proved_columns(still)
+        out = np.array(
+            [(a.verdict | b.verdict) & OF_PLACES for a, b in zip(at_ends.proof, at_starts.proof, strict=True)]
+        )
+        columns = proved_columns(at_ends)
         for name, column in columns.items():
             column[~stays] = 0 if name == "verdict" else np.nan
         columns["verdict"][~stays] = np.where(out == 0, Verdict.UNDECIDED, out)[~stays].astype(FLAGS)
         for name in ("duration", "lower_bound"):
-            columns[name] = np.where(stays & still.feasible, 0.0, np.nan)
+            columns[name] = np.where(stays & at_ends.feasible, 0.0, np.nan)
         moves = np.flatnonzero(~stays & (out == 0))
         if len(moves):
             self._search(columns, moves, starts, ends, z0)
@@ -57,38 +59,39 @@ class FreeMap(ProvedMap):
     def _search(
         self,
         columns: dict[str, np.ndarray],
-        rows: np.ndarray,
+        cells: np.ndarray,
         starts: np.ndarray,
         ends: np.ndarray,
         z0: np.ndarray | None,
     ) -> None:
         # Fill in what is found of some cells.
-        pairs = np.stack([starts[rows], ends[rows]], axis=1)
+        pairs = np.stack([starts[cells], ends[cells]], axis=1)
         units = None if self._unit is None else self._frame.rotated_quaternions(np.tile(self._unit, (2, 1)))
         accelerations = np.full((2, 3 if units is None else 6), np.nan)
         accelerations[:1] = 0.0 if self._rests else np.nan
-        depths = pairs[..., 2].mean(1) if z0 is None else z0[rows]
+        depths = pairs[..., 2].mean(1) if z0 is None else z0[cells]
         poses = [
             FreePoses(pair, units, np.zeros((2, 3)), accelerations, depth)
             for pair, depth in zip(pairs, depths.tolist(), strict=True)
         ]
         lines = [Spline(as_float64(np.array([0.0, 1.0])), as_float64(pair[None]), self._turning()) for pair in pairs]
-        columns["lower_bound"][rows] = time_bounds(self._problem, lines)
+        columns["lower_bound"][cells] = time_bounds(self._problem, lines)
         motions = free_motions(self._problem, self._scene, poses)
-        if len(motions.rows):
-            reached, answers = rows[motions.rows], motions.answers
+        if len(motions.indices):
+            reached, answers = cells[motions.indices], motions.answers
             columns["duration"][reached] = np.where(answers.feasible, answers.duration, np.nan)
             for name, column in proved_columns(answers).items():
                 columns[name][reached] = column
 
-    def _still(self, places: np.ndarray) -> ProvedAnswers:
-        # A second of rest in each place.
+    def _at_rest(self, positions: np.ndarray) -> ProvedAnswers:
+        # A second of rest in each position.
         motions = [
-            Spline(as_float64(np.array([0.0, 1.0])), as_float64(place[None, None]), self._turning()) for place in places
+            Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), self._turning())
+            for position in positions
         ]
-        several = SplineBatch(motions)
-        proofs = proofs_of(self._problem, several.bounds, several.durations, self._scene, several.jumps)
-        answers = answers_of(proofs, several.durations)
+        splines = SplineBatch(motions)
+        proofs = proofs_of(self._problem, splines.bounds, splines.durations, self._scene, splines.jumps)
+        answers = answers_of(proofs, splines.durations)
         judge_all_robots(self._problem, answers, motions, self._scene)
         return answers
 

@@ -18,7 +18,7 @@ FIRST = (0, 1, 3)
 # Weight of the barriers, and softness, of a search from a start, and from a neighbour's motion.
 FROM_START, FROM_NEIGHBOUR = (BARRIERS[0], 10.0), (1e-2, 1.0)
 # Neighbours of a pair; how many of them can help; part of its time by which one must be faster, besides the distance
-# over the way; largest ratio of ways that counts.
+# over the length; largest ratio of lengths that counts.
 NEAR, VISITS, FASTER, RATIO = 8, 2, 0.02, 2.0
 
 
@@ -33,15 +33,15 @@ class Neighbours:
     def __init__(self, tasks: Tasks, depths: Sequence[float]) -> None:
         """Begin without any."""
         self._tasks, self._depths, count = tasks, depths, len(depths)
-        self.controls = np.zeros((count, tasks.basis.controls, tasks.places.shape[-1]))
+        self.controls = np.zeros((count, tasks.basis.controls, tasks.ends.shape[-1]))
         self.duration = np.full(count, np.inf)
-        ends = tasks.places[:, 0]
-        self._way = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        ends = tasks.ends[:, 0]
+        self._lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         flat = ends.reshape(count, -1)
         distance, near = (part.reshape(count, -1) for part in KDTree(flat).query(flat, min(NEAR + 1, count)))
-        rows = np.repeat(np.arange(count), near.shape[1])
-        pairs = np.flatnonzero(rows != near.ravel())
-        self._rows, self._others, self._distance = rows[pairs], near.ravel()[pairs], distance.ravel()[pairs]
+        owners = np.repeat(np.arange(count), near.shape[1])
+        pairs = np.flatnonzero(owners != near.ravel())
+        self._pairs, self._others, self._distance = owners[pairs], near.ravel()[pairs], distance.ravel()[pairs]
         self._tried = np.full(len(pairs), np.inf)
 
     @property
@@ -56,43 +56,43 @@ class Neighbours:
         if len(self.lacking):
             self._from_starts(self.lacking, others=True)
 
-    def _from_starts(self, rows: np.ndarray, *, others: bool) -> None:
-        parts = [starts(self._tasks.taken(rows[i : i + 1]), self._depths[k]) for i, k in enumerate(rows.tolist())]
+    def _from_starts(self, pairs: np.ndarray, *, others: bool) -> None:
+        parts = [starts(self._tasks.take(pairs[i : i + 1]), self._depths[k]) for i, k in enumerate(pairs.tolist())]
         chosen = np.flatnonzero(np.isin(np.arange(len(parts[0].task)), FIRST, invert=others))
         controls, duration = (np.concatenate([part[i][chosen, 0] for part in parts]) for i in (1, 2))
-        self._improve(np.repeat(rows, len(chosen)), controls, duration, FROM_START)
+        self._improve(np.repeat(pairs, len(chosen)), controls, duration, FROM_START)
 
-    def _improve(self, rows: np.ndarray, controls: np.ndarray, duration: np.ndarray, how: tuple[float, float]) -> None:
+    def _improve(self, pairs: np.ndarray, controls: np.ndarray, duration: np.ndarray, how: tuple[float, float]) -> None:
         # Search from motions, none or several ones for a pair.
-        tasks = self._tasks.taken(rows)
+        tasks = self._tasks.take(pairs)
         result = optima(tasks, started(tasks, controls[:, None], duration[:, None], how[0]), *how)
         times = np.where(result.is_optimal, result.unknowns.duration[:, 0], np.inf)
         controls = tasks.controls(result.unknowns)[:, 0]
         for k in np.flatnonzero(times < np.inf).tolist():
-            if times[k] < self.duration[rows[k]]:
-                self.duration[rows[k]], self.controls[rows[k]] = times[k], controls[k]
+            if times[k] < self.duration[pairs[k]]:
+                self.duration[pairs[k]], self.controls[pairs[k]] = times[k], controls[k]
 
     def _from_neighbours(self) -> None:
-        rows, others = self._rows, self._others
-        longest = np.maximum(np.maximum(self._way[rows], self._way[others]), 1e-9)
-        ratio = np.clip(self._way[rows] / np.maximum(self._way[others], 1e-9), 1.0 / RATIO, RATIO)
+        pairs, others = self._pairs, self._others
+        longest = np.maximum(np.maximum(self._lengths[pairs], self._lengths[others]), 1e-9)
+        ratio = np.clip(self._lengths[pairs] / np.maximum(self._lengths[others], 1e-9), 1.0 / RATIO, RATIO)
         fraction = 1.0 + FASTER + self._distance / longest
         for _ in range(VISITS):
             # A motion is tried once.
             expected = self.duration[others] * np.sqrt(ratio)
-            helps = (expected * fraction < self.duration[rows]) & (self.duration[others] < self._tried)
+            helps = (expected * fraction < self.duration[pairs]) & (self.duration[others] < self._tried)
             best = np.full(len(self.duration), np.inf)
-            np.minimum.at(best, rows[helps], expected[helps])
-            chosen = np.flatnonzero(helps & (expected == best[rows]))
-            chosen = chosen[np.unique(rows[chosen], return_index=True)[1]]
+            np.minimum.at(best, pairs[helps], expected[helps])
+            chosen = np.flatnonzero(helps & (expected == best[pairs]))
+            chosen = chosen[np.unique(pairs[chosen], return_index=True)[1]]
             if not len(chosen):
                 break
             self._tried[chosen] = self.duration[others[chosen]]
-            self._improve(rows[chosen], self._moved(others[chosen], rows[chosen]), expected[chosen], FROM_NEIGHBOUR)
+            self._improve(pairs[chosen], self._moved(others[chosen], pairs[chosen]), expected[chosen], FROM_NEIGHBOUR)
 
     def _moved(self, source: np.ndarray, to: np.ndarray) -> np.ndarray:
         # Motions of some pairs, moved to the poses of others.
         tau = self._tasks.basis.averages[:, None]
         fraction = 3.0 * tau**2 - 2.0 * tau**3
-        shift = self._tasks.places[to, 0] - self._tasks.places[source, 0]
+        shift = self._tasks.ends[to, 0] - self._tasks.ends[source, 0]
         return self.controls[source] + shift[:, :1] * (1.0 - fraction) + shift[:, 1:] * fraction

@@ -14,7 +14,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.families.free.search.basis import Basis
 from cspr_jax.families.free.search.determinants import determinant
-from cspr_jax.families.free.search.instants import DEPTH, ValueBounds, coordinates
+from cspr_jax.families.free.search.equations import DEPTH, ValueBounds, coordinates
 from cspr_jax.families.free.search.objectives import Objective
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
 from cspr_jax.motion.problem import Problem
@@ -55,9 +55,9 @@ class FreePoses(NamedTuple):
 
 
 class _Joined(NamedTuple):
-    # Segments in coordinates: places and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations
+    # Segments in coordinates: ends and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations
     # (s + 1, d).
-    places: np.ndarray
+    ends: np.ndarray
     velocities: np.ndarray
     references: np.ndarray
     turns: np.ndarray
@@ -67,8 +67,8 @@ class _Joined(NamedTuple):
 def check_searched(problem: Problem) -> None:
     """Refuse a problem for which no free motion is sought."""
     robot, maximum = problem.robot, problem.limits.tension_max
-    row = PATTERNS[robot.pattern]
-    if row.is_jointed or row.along_line:
+    pattern = PATTERNS[robot.pattern]
+    if pattern.is_jointed or pattern.along_line:
         raise InputError("pattern", robot.pattern, '"1T", "2T", "3T", "1R2T" or "3R3T" for free motions')
     if maximum is None or not np.isfinite(np.asarray(maximum)).all():
         raise InputError("tension_max", None, "a number, N: without it the least time is that of impulses")
@@ -77,13 +77,13 @@ def check_searched(problem: Problem) -> None:
 def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     along, about = coordinates(problem.robot.pattern)
     count, d = len(poses.positions) - 1, len(along) + len(about)
-    places = np.zeros((count, 2, d))
-    places[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
+    ends = np.zeros((count, 2, d))
+    ends[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
     turns, references = np.tile(np.eye(d), (count, 2, 1, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    velocities, linear = np.zeros_like(places), poses.accelerations[:, along]
+    velocities, linear = np.zeros_like(ends), poses.accelerations[:, along]
     velocities[..., : len(along)] = np.stack([poses.velocities[:-1], poses.velocities[1:]], axis=1)[..., along]
     if poses.quaternions is None:
-        return _Joined(places, velocities, references, turns, linear)
+        return _Joined(ends, velocities, references, turns, linear)
     start, end = poses.quaternions[:-1], poses.quaternions[1:]
     end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
     # From half-way between, a Rodrigues vector is no longer than 1.
@@ -91,13 +91,13 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     for side, quaternions in enumerate((start, end)):
         turning = products(quaternions, references * BACK)
         vector = turning[:, 1:] / turning[:, :1]
-        places[:, side, len(along) :] = vector[:, about]
+        ends[:, side, len(along) :] = vector[:, about]
         for i, v in enumerate(vector):
             across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
             spin = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
             turns[i, side, len(along) :, len(along) :] = np.linalg.inv(spin[np.ix_(about, about)])
     accelerations = np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1)
-    return _Joined(places, velocities, references, turns, accelerations)
+    return _Joined(ends, velocities, references, turns, accelerations)
 
 
 def determinants(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "k"]:
@@ -124,20 +124,20 @@ def divided(problem: Problem, poses: FreePoses) -> Int[np.ndarray, "n 3"]:
     if not judged_poses(problem.robot)[0]:
         return np.zeros((0, 3))
     values = determinants(problem, poses)
-    rows = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-    return np.stack([rows, values[rows], values[rows + 1]], axis=1)
+    crossings = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    return np.stack([crossings, values[crossings], values[crossings + 1]], axis=1)
 
 
-def _sides(values: np.ndarray, part: float, most: float = np.inf) -> np.ndarray:
+def _sides(values: np.ndarray, part: float, cap: float = np.inf) -> np.ndarray:
     # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side
     # of both ends, by this part of the smaller value, or by so much.
     ends = np.stack([values[:-1], values[1:]])
-    minimum = np.minimum(part * np.abs(ends).min(0), most)
+    minimum = np.minimum(part * np.abs(ends).min(0), cap)
     return np.stack([np.where((ends > 0.0).all(0), minimum, -np.inf), np.where((ends < 0.0).all(0), -minimum, np.inf)])
 
 
 def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:
-    # Depths (k,) of the poses below the plane of the spools, over the size of the robot.
+    # Depths (k,) of the poses below the plane of the spools, over the robot's radius.
     return poses.positions @ np.asarray(plane_normal(problem.robot)) / float(spool_radius(problem.robot))
 
 
@@ -145,9 +145,9 @@ def tasks_of(
     problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
 ) -> Tasks:
     """The task of moving through all poses."""
-    places, velocities, references, turns, accelerations = _joined(problem, poses)
+    ends, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
-    shape = 1, len(places), *basis.tau.shape, len(bounds.low)
+    shape = 1, len(ends), *basis.tau.shape, len(bounds.low)
     low, high = (np.broadcast_to(side, shape).copy() for side in (bounds.low, bounds.high))
     if bounds.determinant is not None:
         sides = _sides(determinants(problem, poses), REGULAR)
@@ -159,7 +159,7 @@ def tasks_of(
         robot=problem.robot,
         limits=problem.limits,
         basis=basis,
-        places=places[None],
+        ends=ends[None],
         velocities=velocities[None],
         references=references[None],
         turns=turns[None],
@@ -183,10 +183,10 @@ def segments_of(tasks: Tasks) -> Tasks:
         pairs = np.stack([part[:, :-1], part[:, 1:]], axis=2)
         return pairs.reshape(-1, *pairs.shape[2:])
 
-    count = tasks.places.shape[1]
+    count = tasks.ends.shape[1]
     return dataclasses.replace(
         tasks,
-        places=one(tasks.places),
+        ends=one(tasks.ends),
         velocities=one(tasks.velocities),
         references=one(tasks.references),
         turns=one(tasks.turns),
@@ -198,14 +198,14 @@ def segments_of(tasks: Tasks) -> Tasks:
     )
 
 
-def quaternions_of(tasks: Tasks, places: Float[np.ndarray, "l s ... d"]) -> Float[np.ndarray, "l s ... 4"] | None:
+def quaternions_of(tasks: Tasks, samples: Float[np.ndarray, "l s ... d"]) -> Float[np.ndarray, "l s ... 4"] | None:
     """Orientations of the platforms of tasks."""
     along, about = coordinates(tasks.robot.pattern)
     if not len(about):
         return None
-    turning = np.zeros((*places.shape[:-1], 4))
+    turning = np.zeros((*samples.shape[:-1], 4))
     turning[..., 0] = 1.0
-    turning[..., 1 + about] = places[..., len(along) :]
+    turning[..., 1 + about] = samples[..., len(along) :]
     turning /= np.linalg.norm(turning, axis=-1, keepdims=True)
     segments = zip(turning.reshape(-1, *turning.shape[2:]), tasks.references.reshape(-1, 4), strict=True)
     return np.stack([products(one.reshape(-1, 4), at[None]) for one, at in segments]).reshape(turning.shape)

@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.families.free.poses import FreePoses, check_searched, tasks_of
 from cspr_jax.families.free.search.basis import basis
-from cspr_jax.families.free.search.instants import ValueBounds, bounds, coordinates
+from cspr_jax.families.free.search.equations import ValueBounds, bounds, coordinates
 from cspr_jax.families.free.search.objectives import OBJECTIVES, Objective
 from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.motion.problem import Problem
@@ -16,13 +16,14 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
 
-# Slack that is left after tightening, in the units of values; by how much at least and at most bounds tighten, the most
-# times half their range where that is above 1; by what share of it those of the next pieces do.
-LEFT, STEP, MOST, BESIDE = 1e-7, 1e-6, 0.03, 0.5
+# Slack that is left after tightening, in the units of values; smallest and largest part by which bounds tighten, the
+# latter times half their range where that is above 1; by what part of it those of the next pieces do.
+LEFT, STEP, MAX_PART, BESIDE = 1e-7, 1e-6, 0.03, 0.5
 # By what more than is missed they tighten; from what time on by its powers, since some motions give way to each step.
 MORE, PATIENCE = 1.5, 4
-# Instants of each interval, of point masses and of platforms: between two of them, the tensions of platforms bend more.
-INSTANTS = 4, 8
+# Samples of each interval, of point masses and of platforms: between two of them, the tensions of platforms change
+# more.
+SAMPLES = 4, 8
 
 
 class FreeSettings(NamedTuple):
@@ -34,7 +35,7 @@ class FreeSettings(NamedTuple):
         starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
         until: time of `time.monotonic` at which all searches end, s.
         intervals: of the spline of a segment, even.
-        instants: of each interval, at which the search looks; None for those of `INSTANTS`.
+        samples: of each interval at which limits are kept; None for those of `SAMPLES`.
     """
 
     objective: str = "time"
@@ -42,7 +43,7 @@ class FreeSettings(NamedTuple):
     starts: int | None = None
     until: float = np.inf
     intervals: int = 48
-    instants: int | None = None
+    samples: int | None = None
 
 
 def planned_problem(problem: Problem) -> Problem:
@@ -55,7 +56,7 @@ class FreeQuestion:
     """The best motion through poses within limits is sought.
 
     Fields:
-        limits: bounds of the values at each instant.
+        limits: bounds of the values at each sample.
     """
 
     problem: Problem
@@ -85,14 +86,14 @@ class FreeQuestion:
         return planned_problem(self.problem)
 
     @property
-    def instants(self) -> int:
-        """Instants of each interval at which the search looks in the end."""
+    def samples(self) -> int:
+        """Samples of each interval at which limits are kept in the end."""
         turns = len(coordinates(self.problem.robot.pattern)[1]) > 0
-        return self.settings.instants or INSTANTS[turns]
+        return self.settings.samples or SAMPLES[turns]
 
-    def tasks(self, intervals: int, instants: int) -> Tasks:
+    def tasks(self, intervals: int, samples: int) -> Tasks:
         """The question on some intervals."""
-        numbers = basis(intervals, instants)
+        numbers = basis(intervals, samples)
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
@@ -116,19 +117,19 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
     if not (missed > 0.0).any():
         return None
     half = 0.5 * (limits.high - limits.low)
-    size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
-    steps = np.where(missed > 0.0, np.minimum(more(number) * missed + STEP, MOST * size), 0.0) / np.where(
-        unit > 0.0, unit, 1.0
-    )
+    range_of_values = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
+    steps = np.where(
+        missed > 0.0, np.minimum(more(number) * missed + STEP, MAX_PART * range_of_values), 0.0
+    ) / np.where(unit > 0.0, unit, 1.0)
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
     near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])
     near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
     shape = *tasks.low.shape[:3], 1, -1
-    rise, fall = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
+    rise, drop = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
     count = tasks.n_limited
     tighter = dataclasses.replace(tasks, low=tasks.low.copy(), high=tasks.high.copy())
     tighter.low[..., :count] += rise
-    tighter.high[..., :count] -= fall
+    tighter.high[..., :count] -= drop
     return tighter

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from cspr_jax.curves.spline import Spline
-from cspr_jax.families.free.contacts import apart, around
+from cspr_jax.families.free.contacts import around, separated
 from cspr_jax.families.free.poses import motions_of
 from cspr_jax.families.free.problem import FreeQuestion, slacks_of, tightened
 from cspr_jax.families.free.robust import for_all_robots, widened
@@ -15,7 +15,7 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.verification.piece_slacks import PieceSlacks
 from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
 
-# Rounds of proof and tightening, and rounds before in which room is left for all robots.
+# Rounds of proof and tightening, and rounds before in which slack is left for all robots.
 ROUNDS, WIDER = 10, 3
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
 ON = ((1e-5, 1e-2), (1e-4, 1e-1), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
@@ -80,14 +80,14 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
 def _tighter(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
 ) -> tuple[Tasks, Unknowns] | None:
-    # The task within tighter bounds, and the motion as one of it; None where the proof finds enough room everywhere.
+    # The task within tighter bounds, and the motion as one of it; None where the proof finds enough slack everywhere.
     tighter = tightened(question, tasks, slacks, number)
-    parted = apart(question, tighter or tasks, unknowns, slacks, number) if question.is_planned else None
+    parted = separated(question, tighter or tasks, unknowns, slacks, number) if question.is_planned else None
     return parted or (None if tighter is None else (tighter, unknowns))
 
 
 def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Tasks, Unknowns] | None:
-    # The best motion within other bounds, from one found before; None where no room is left between them.
+    # The best motion within other bounds, from one found before; None where they leave nothing between them.
     low, high = tasks.bounds(unknowns.level)
     if not (low < high).all():
         return None
@@ -102,9 +102,9 @@ def robust_proof(
     """The best motion for all robots within an uncertainty, from that of the planned robot."""
     all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
     try:
-        full = _with_room(all_robots, tasks, tasks, unknowns)
-        part = None if full else _with_room(fewer, tasks, tasks, unknowns)
-        full = _with_room(all_robots, tasks, *part) if part else full
+        full = _with_slack(all_robots, tasks, tasks, unknowns)
+        part = None if full else _with_slack(fewer, tasks, tasks, unknowns)
+        full = _with_slack(all_robots, tasks, *part) if part else full
     except (KeyboardInterrupt, OutOfTime):
         return None
     if full:
@@ -112,10 +112,10 @@ def robust_proof(
     return proved(fewer, *part) if part else None
 
 
-def _with_room(
+def _with_slack(
     question: FreeQuestion, nominal: Tasks, tasks: Tasks, unknowns: Unknowns
 ) -> tuple[Tasks, Unknowns] | None:
-    # The best motion with room for all robots beside the bounds of the planned one, from one found before.
+    # The best motion with slack for all robots beside the bounds of the planned one, from one found before.
     best = None
     for number in range(1, WIDER + 1):
         stage(f"free motion: room for all robots {number}")

@@ -1,11 +1,12 @@
-"""Bounds of a search that leave room for all robots within an uncertainty.
+"""Bounds of a search that leave slack for all robots within an uncertainty.
 
 Tensions and speeds of cables of other robots differ from those of the planned one by amounts that depend little on the
-motion. So bounds of the planned robot tighten at each instant by what is proved that a slack loses there, of a motion
+motion. So bounds of the planned robot tighten at each sample by what is proved that a slack loses there, of a motion
 that was found before; a few rounds find the motion to which its own losses belong.
 
 Near the plane of the spools this is not so: there, losses grow as the inverse of the depth below the plane, and with
-the tensions themselves. Where they are a large share of these, a point mass stays deeper, until they are that share.
+the tensions themselves. Where they are a large fraction of these, a point mass stays deeper, until they are that
+fraction.
 """
 
 import dataclasses
@@ -22,11 +23,11 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import all_robots_slacks, short_blocks
 
-# Multiple of an uncertainty for which the search leaves room, so that blocks of the proof need not be very short.
+# Multiple of an uncertainty for which the search leaves slack, so that blocks of the proof need not be very short.
 MULTIPLE = 1.02
 # Largest loss of a slack over half the range of the value that it bounds. Near the plane of the spools: largest loss of
 # a tension over the largest tension there; by what depths grow in a round at most, and up to what part of the poses'.
-LARGEST, SHARE, DEEPER, ABOVE = 0.5, 0.25, 4.0, 0.5
+LARGEST, FRACTION, DEEPER, ABOVE = 0.5, 0.25, 4.0, 0.5
 # Tensions, and the depth on which their losses depend.
 DEPENDING = Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS
 
@@ -44,14 +45,14 @@ def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: f
 
 
 def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Tasks:
-    """Bounds that leave room for all robots within an uncertainty."""
+    """Bounds that leave slack for all robots within an uncertainty."""
     problem, limits, states = question.problem, question.limits, _states(tasks, motions)
     before, after = (all_robots_slacks(problem, states, multiple) for multiple in (0.0, 1.0))
     half, count = 0.5 * (limits.high - limits.low), before.shape[1]
     maximum = LARGEST * np.where(np.isfinite(half) & (half > 0.0), half, 1.0)
     with np.errstate(invalid="ignore"):
         lost = np.maximum(np.nan_to_num(before - after, nan=0.0, posinf=np.inf), 0.0)
-        rise, fall = (
+        rise, drop = (
             np.max(np.where(side > 0.0, np.minimum(lost[..., None] * side, maximum), 0.0), axis=1).reshape(
                 tasks.low.shape
             )
@@ -59,11 +60,11 @@ def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Task
         )
     depths = _depths(question, states, before, lost, tasks.basis.tau.size)
     low = tasks.low + rise if depths is None else np.maximum(tasks.low + rise, depths.reshape(tasks.low.shape))
-    return dataclasses.replace(tasks, low=low, high=tasks.high - fall)
+    return dataclasses.replace(tasks, low=low, high=tasks.high - drop)
 
 
 def _states(tasks: Tasks, motions: list[Spline]) -> StateBounds:
-    # At all instants.
+    # At all samples.
     tau = tasks.basis.tau.ravel()
     durations = np.array([float(motion.knots[-1]) for motion in motions])
     ends = np.cumsum(durations)[:, None]
@@ -73,20 +74,20 @@ def _states(tasks: Tasks, motions: list[Spline]) -> StateBounds:
 
 
 def _depths(
-    question: FreeQuestion, states: StateBounds, slacks: np.ndarray, lost: np.ndarray, instants: int
+    question: FreeQuestion, states: StateBounds, slacks: np.ndarray, lost: np.ndarray, samples: int
 ) -> np.ndarray | None:
     # Lower bounds of values (k, n_values), of depths below the spools, from slacks and losses (k, n_criteria), with the
-    # number of instants of each segment.
+    # number of samples of each segment.
     problem, limits = question.problem, question.limits
-    rows = criteria(problem.robot, problem.limits, question.scene)
-    taut, below = ([k for k, row in enumerate(rows) if row.flag == flag] for flag in DEPENDING)
+    all_criteria = criteria(problem.robot, problem.limits, question.scene)
+    taut, below = ([k for k, criterion in enumerate(all_criteria) if criterion.flag == flag] for flag in DEPENDING)
     if states.rotation is not None or not taut:
         return None
-    tensions = slacks[:, taut] + [rows[k].allowed for k in taut]
-    deeper = np.minimum(lost[:, taut].max(1) / (SHARE * np.abs(tensions).max(1)), DEEPER)
+    tensions = slacks[:, taut] + [all_criteria[k].allowed for k in taut]
+    deeper = np.minimum(lost[:, taut].max(1) / (FRACTION * np.abs(tensions).max(1)), DEEPER)
     depth = np.asarray(states.position.middle) @ np.asarray(plane_normal(problem.robot))
     # The poses are where they are.
-    of_segments = depth.reshape(-1, instants)
-    ends = np.repeat(np.minimum(of_segments[:, 0], of_segments[:, -1]), instants)
+    of_segments = depth.reshape(-1, samples)
+    ends = np.repeat(np.minimum(of_segments[:, 0], of_segments[:, -1]), samples)
     change = limits.rises[below].sum(0)
     return np.where(change > 0.0, np.minimum(deeper * depth, ABOVE * ends)[:, None] * change, -np.inf)

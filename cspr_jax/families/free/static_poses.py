@@ -18,7 +18,7 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Criteria of a place alone, which no motion to it meets where it does not; where a robot is to rest, all are.
+# Criteria of a position alone, which no motion to it meets where it does not; where a robot is to rest, all are.
 _OF_PLACES = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
 OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
 

@@ -1,8 +1,8 @@
 """Least duration along a straight line under any limits, by search over the ratio p / T.
 
-For one law every slack is affine in q = 1 / T^2, so that each instant bounds q from above, or, where the robot could
-not rest, from below. The largest q is looked for at samples, between which a parabola through three of them corrects
-each smallest bound; the ratio is looked for on finer and finer grids.
+For one law every slack is affine in q = 1 / T^2, so that each sample bounds q from above, or, where the robot could
+not rest, from below. The largest q is searched for among samples, between which a parabola through three of them
+corrects each smallest bound; the ratio is searched for on finer and finer grids.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.families.lines.motion import s_curve
-from cspr_jax.families.lines.s_model import Least
-from cspr_jax.families.lines.slacks import Instants, LineSlacks, slacks, tensions_at
+from cspr_jax.families.lines.s_model import LeastDuration
+from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensions_at
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 
 if TYPE_CHECKING:
@@ -25,13 +25,14 @@ if TYPE_CHECKING:
 # Samples of a piece of the S-model, and of half of another law.
 SAMPLES = 33
 HALF = 2 * SAMPLES
-# Ratios tried first, as logits; then, in each round, these shares of the distance from the best one to its neighbours.
+# Ratios tried first, as logits; then, in each round, these fractions of the distance from the best one to its
+# neighbours.
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
-# Shares by which the duration of a search is made longer, one after the other, until it is proved.
+# Fractions by which the duration of a search is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 # The acceleration of a cable has a peak where the cable is short: samples lie at so many of its shortest lengths to
-# both sides of that place, on the line; halvings find their instants.
+# both sides of that point, on the line; halvings find their times.
 BESIDE, HALVINGS = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3), 45
 
 
@@ -40,10 +41,10 @@ class Gain(NamedTuple):
 
     Fields:
         high: () largest q, 1/s^2; not above 0 if there is none.
-        low: () smallest q, 1/s^2: 0 unless places are passed at which the robot could not rest.
-        up: number of the row that bounds q in the first half: faces of taut cables come first, then the same faces as
-            smallest tensions shift them, then as largest tensions do, the rows of the other limits in their order, and
-            last the largest acceleration.
+        low: () smallest q, 1/s^2: 0 unless points are passed at which the robot could not rest.
+        up: number of the slack that bounds q in the first half: faces of taut cables come first, then the same faces as
+            smallest tensions shift them, then as largest tensions do, the other limits in their order, and last
+            the largest acceleration.
         down: likewise in the second half.
     """
 
@@ -66,19 +67,19 @@ def gain(
     s, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
     # At rest, and at q = 1: (2, n_pieces, n_samples, 1).
     both = jnp.asarray([0.0, 1.0])[:, None, None, None]
-    instants = Instants(s[None], both * speed[None] ** 2, both * second_derivative[None])
+    states = LineStates(s[None], both * speed[None] ** 2, both * second_derivative[None])
     line = jax.tree.map(lambda x: x[None, None, None], line)
     tensions = tensions_at(line, line.tightest, s[None])
-    rows = [slacks(line, line.tightest, instants, tensions)]
-    rows += [slacks(line, name, instants) for name in line.names if name in line.largest]
-    still, moving = jnp.concatenate(rows, axis=-1)
-    is_finite = jnp.isfinite(still)
-    maximum = jnp.where(is_finite, still, 1.0)
-    needed = jnp.where(is_finite, still - moving, 0.0)
+    groups = [slacks(line, line.tightest, states, tensions)]
+    groups += [slacks(line, name, states) for name in line.names if name in line.largest]
+    at_rest, moving = jnp.concatenate(groups, axis=-1)
+    is_finite = jnp.isfinite(at_rest)
+    maximum = jnp.where(is_finite, at_rest, 1.0)
+    needed = jnp.where(is_finite, at_rest - moving, 0.0)
     maximum = jnp.concatenate([maximum, jnp.broadcast_to(largest[None, None, None], second_derivative.shape)], axis=-1)
     needed = jnp.concatenate([needed, jnp.abs(second_derivative)], axis=-1)
-    is_known = jnp.concatenate([is_finite, jnp.ones_like(second_derivative, bool)], axis=-1)
-    above = _above(maximum, needed, is_known)
+    is_limited = jnp.concatenate([is_finite, jnp.ones_like(second_derivative, bool)], axis=-1)
+    above = _above(maximum, needed, is_limited)
     below = jnp.where((maximum < 0.0) & (needed < 0.0), maximum / jnp.where(needed < 0.0, needed, 1.0), 0.0)
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
@@ -88,24 +89,26 @@ def gain(
     q_range = Gain(high, jnp.max(below), up, down)
     if "cable_acceleration_max" not in line.largest:
         return q_range
-    count = rows[0].shape[-1]
+    count = groups[0].shape[-1]
     return _with_peaks(q_range, halves, _near_spools(line, law), middle, 3 * count)
 
 
-def _above(most: Array, needed: Array, is_known: Array) -> Array:
-    # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is most - q needed.
-    is_known &= most > 0.0
-    fraction = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known)
+def _above(at_rest: Array, needed: Array, is_limited: Array) -> Array:
+    # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is at_rest - q needed.
+    is_limited &= at_rest > 0.0
+    fraction = _between(jnp.where(at_rest > 0.0, needed / jnp.where(at_rest > 0.0, at_rest, 1.0), 0.0), is_limited)
     above = jnp.where(fraction > 0.0, 1.0 / jnp.where(fraction > 0.0, fraction, 1.0), jnp.inf)
-    return jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
+    return jnp.where((at_rest <= 0.0) & (needed >= 0.0), -1.0, above)
 
 
 def _near_spools(
     line: LineSlacks, law: Amplitude
 ) -> tuple[Float[Array, "n_cables n_samples n_rows"], Float[Array, "n_cables n_samples 1"]]:
-    """Largest q under the limits of motion, near the place where each cable is shortest."""
+    """Largest q under the limits of motion, near the point where each cable is shortest."""
     line = jax.tree.map(lambda x: x[0, 0, 0], line)
-    s = jnp.clip(line.nearest[:, None] + jnp.sqrt(line.apart / line.square)[:, None] * BESIDE[None], 0.0, 1.0)
+    s = jnp.clip(
+        line.nearest[:, None] + jnp.sqrt(line.squared_distance / line.square)[:, None] * BESIDE[None], 0.0, 1.0
+    )
 
     def halved(_, ends):
         low, high = ends
@@ -114,18 +117,18 @@ def _near_spools(
         return jnp.where(is_before, middle, low), jnp.where(is_before, high, middle)
 
     tau, _ = lax.fori_loop(0, HALVINGS, halved, (jnp.zeros_like(s), jnp.ones_like(s)))
-    way, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
-    at = Instants(way, speed**2, second_derivative)
+    position, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
+    at = LineStates(position, speed**2, second_derivative)
     line = jax.tree.map(lambda x: x[None, None], line)
-    rows = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
+    groups = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
     # Parabolas are not laid here, since knots of the law lie between these samples.
-    return _above(jnp.ones_like(rows), 1.0 - rows, jnp.zeros_like(rows, bool)), tau[..., None]
+    return _above(jnp.ones_like(groups), 1.0 - groups, jnp.zeros_like(groups, bool)), tau[..., None]
 
 
-def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
-    # Take in the peaks beside spools: they may bound q more, and then their row is named for its half.
+def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_peak: int) -> Gain:
+    # Add the peaks beside spools: they may bound q more, and then their limit is named for its half.
     above, tau = peaks
-    numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_row, above.shape).ravel()
+    numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_peak, above.shape).ravel()
     sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]
     names = [
         jnp.where(jnp.min(side) < jnp.min(half), numbers[jnp.argmin(side)], name)
@@ -135,36 +138,36 @@ def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], 
 
 
 def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:
-    # Number the rows of each sample; a face that is shifted by tensions has another number.
+    # Number the slacks of each sample; a face that is shifted by tensions has another number.
     low, high = line.low[line.tightest][..., None, :], line.high[line.tightest][..., None, :]
-    pulls = tensions > 0.0
-    by_largest = (pulls & (tensions == high) & (low < high)).any(-1)[0]
-    by_smallest, count = pulls.any(-1)[0] & ~by_largest, by_largest.shape[-1]
+    is_tensioned = tensions > 0.0
+    by_largest = (is_tensioned & (tensions == high) & (low < high)).any(-1)[0]
+    by_smallest, count = is_tensioned.any(-1)[0] & ~by_largest, by_largest.shape[-1]
     faces = jnp.where(by_largest, 2 * count, jnp.where(by_smallest, count, 0))
     others = jnp.full((*shape[:2], shape[2] - count), 2 * count)
     shift = jnp.concatenate([faces, others], axis=-1)
     return jnp.arange(shape[2])[None, None] + shift
 
 
-def _between(values: Array, is_known: Array) -> Array:
+def _between(values: Array, is_limited: Array) -> Array:
     # Samples (n_pieces, n_samples, n_rows) that are the largest of three, raised to the parabola's vertex. An end of a
     # piece is raised where the parabola still rises from it.
     a, b, c = values[:, :-2], values[:, 1:-1], values[:, 2:]
-    three = is_known[:, :-2] & is_known[:, 1:-1] & is_known[:, 2:]
+    three = is_limited[:, :-2] & is_limited[:, 1:-1] & is_limited[:, 2:]
     is_high, curvature = three & (b >= a) & (b >= c), 2.0 * b - a - c
     higher = b + (c - a) ** 2 / (8.0 * jnp.where(curvature > 0.0, curvature, 1.0))
     inner = jnp.where(is_high & (curvature > 0.0), higher, b)
-    first = _from_end(values[:, :3], is_known[:, :3].all(1))
-    last = _from_end(values[:, :-4:-1], is_known[:, :-4:-1].all(1))
+    first = _from_end(values[:, :3], is_limited[:, :3].all(1))
+    last = _from_end(values[:, :-4:-1], is_limited[:, :-4:-1].all(1))
     return jnp.concatenate([first[:, None], inner, last[:, None]], axis=1)
 
 
-def _from_end(values: Array, is_known: Array) -> Array:
+def _from_end(values: Array, is_limited: Array) -> Array:
     # Return the peak that the three samples at an end show, that end first; without a peak, the value at the end.
     a, b, c = (values[:, k] for k in range(3))
-    slope, curvature = 0.5 * (4.0 * b - 3.0 * a - c), 2.0 * b - a - c
-    rises = is_known & (slope > 0.0) & (curvature > slope)
-    return jnp.where(rises, a + slope**2 / (2.0 * jnp.where(rises, curvature, 1.0)), a)
+    derivative, curvature = 0.5 * (4.0 * b - 3.0 * a - c), 2.0 * b - a - c
+    rises = is_limited & (derivative > 0.0) & (curvature > derivative)
+    return jnp.where(rises, a + derivative**2 / (2.0 * jnp.where(rises, curvature, 1.0)), a)
 
 
 def gain_of_law(line: LineSlacks, ratio: Float[Array, ""], largest: Float[Array, ""], law: Amplitude | None) -> Gain:
@@ -175,34 +178,34 @@ def gain_of_law(line: LineSlacks, ratio: Float[Array, ""], largest: Float[Array,
     return gain(line, s_curve(ratio), edges, ratio, largest)
 
 
-def least_by_search(line: LineSlacks, largest: Float[Array, ""], law: Amplitude | None) -> Least:
+def least_by_search(line: LineSlacks, largest: Float[Array, ""], law: Amplitude | None) -> LeastDuration:
     """Least duration along a line under its limits."""
     if law is not None:
         half = jnp.asarray(0.5)
-        return _least(gain_of_law(line, half, largest, law), half)
+        return _least_duration(gain_of_law(line, half, largest, law), half)
 
     def cost(logit):
         q_range = gain_of_law(line, jax.nn.sigmoid(logit), largest, None)
         return jnp.where(q_range.low <= q_range.high, -q_range.high, jnp.maximum(q_range.low, 0.0)), q_range
 
     logits = jnp.asarray(LOGITS)
-    place = logits[jnp.argmin(lax.map(cost, logits)[0])]
+    center = logits[jnp.argmin(lax.map(cost, logits)[0])]
     width = logits[1] - logits[0]
 
     def finer(_, best):
         # The points lie between the neighbours of the best one so far.
-        place, width, _ = best
-        points = place + width * jnp.asarray(FINER)
+        center, width, _ = best
+        points = center + width * jnp.asarray(FINER)
         costs, q_range = lax.map(cost, points)
         i = jnp.argmin(costs)
         return points[i], width * (FINER[1] - FINER[0]), jax.tree.map(lambda x: x[i], q_range)
 
-    none = Gain(jnp.zeros_like(place), jnp.zeros_like(place), jnp.asarray(0), jnp.asarray(0))
-    logit, _, q_range = lax.fori_loop(0, ROUNDS, finer, (place, width, none))
-    return _least(q_range, jax.nn.sigmoid(logit))
+    none = Gain(jnp.zeros_like(center), jnp.zeros_like(center), jnp.asarray(0), jnp.asarray(0))
+    logit, _, q_range = lax.fori_loop(0, ROUNDS, finer, (center, width, none))
+    return _least_duration(q_range, jax.nn.sigmoid(logit))
 
 
-def _least(q_range: Gain, ratio: Array) -> Least:
+def _least_duration(q_range: Gain, ratio: Array) -> LeastDuration:
     is_feasible = (q_range.high > 0.0) & (q_range.low <= q_range.high)
     duration = jnp.where(is_feasible, 1.0 / jnp.sqrt(jnp.where(is_feasible, q_range.high, 1.0)), jnp.inf)
-    return Least(ratio, duration, q_range.up, q_range.down)
+    return LeastDuration(ratio, duration, q_range.up, q_range.down)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 BATCH, BATCH_OF_SEARCH = 4096, 16
 Rule = Literal["optimum", "thesis"]
 # Limits that depend on how the effector moves.
-MOVING = tuple(row.name for row in LIMITS if row.of_motion)
+MOVING = tuple(limit.name for limit in LIMITS if limit.of_motion)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Durations:
     Fields:
         duration: T, s; not finite where there is no motion.
         ratio: p / T.
-        least: no motion along the line is faster, s; 0 where nothing is known.
+        lower_bound: no motion along the line is faster, s; 0 where nothing is proved.
         rest: smaller margin of rest of the two ends, m/s^2.
         depth: smaller depth of the two ends below the plane of the spools, m; inf if the spools have no common plane.
         is_bounded: whether anything bounds the acceleration.
@@ -50,33 +50,33 @@ class Durations:
 
     duration: np.ndarray
     ratio: np.ndarray
-    least: np.ndarray
+    lower_bound: np.ndarray
     rest: np.ndarray
     depth: np.ndarray
     is_bounded: np.ndarray
     up: np.ndarray
     down: np.ndarray
 
-    def part(self, rows: Int[np.ndarray, "n"]) -> "Durations":
+    def part(self, indices: Int[np.ndarray, "n"]) -> "Durations":
         """Durations of some of the lines."""
-        return Durations(**{name: value[rows] for name, value in vars(self).items()})
+        return Durations(**{name: value[indices] for name, value in vars(self).items()})
 
-    def replace(self, rows: np.ndarray, part: "Durations") -> None:
+    def replace(self, indices: np.ndarray, part: "Durations") -> None:
         """Replace the durations of some of the lines."""
         for name, values in vars(part).items():
-            getattr(self, name)[rows] = values
+            getattr(self, name)[indices] = values
 
 
 def moving(limits: Limits) -> tuple[str, ...]:
     """Limits that depend on how the effector moves."""
-    known = [name for name in MOVING if getattr(limits, name) is not None]
-    return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
+    given = [name for name in MOVING if getattr(limits, name) is not None]
+    return tuple(name for name in given if name != "tension_min" or np.asarray(limits.tension_min).any())
 
 
 def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:
     """Names of the bounds along a line."""
     chosen = spanning(robot.n_cables, robot.dof) + 1
-    cables = ("cables " + ", ".join(map(str, row)) for row in chosen.tolist())
+    cables = ("cables " + ", ".join(map(str, cables_of_face)) for cables_of_face in chosen.tolist())
     return (*cables, "max_acceleration", *moving(limits))
 
 
@@ -133,9 +133,9 @@ def by_search(
     minimum = in_batches(
         partial(_by_search, moving_problem, law=law), (starts, ends, largest), batch_size=BATCH_OF_SEARCH
     )
-    rows = _bounds_of_rows(moving_problem)
+    numbers = _bound_numbers(moving_problem)
     return dataclasses.replace(
-        timings, duration=minimum.duration, ratio=minimum.ratio, up=rows[minimum.up], down=rows[minimum.down]
+        timings, duration=minimum.duration, ratio=minimum.ratio, up=numbers[minimum.up], down=numbers[minimum.down]
     )
 
 
@@ -150,8 +150,8 @@ def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_pla
             minimum = fastest.least_s_curve(bounds)
         else:
             minimum = fastest.thesis_s_curve(bounds)
-        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
-        resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
+        norms = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
+        resting = -jnp.stack([faces.offset, faces.offset + faces.offset_change]) / jnp.where(norms > 0.0, norms, 1.0)
         there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
         rest = jnp.min(jnp.where(there, resting, jnp.inf))
         is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
@@ -176,16 +176,17 @@ def _by_search(problem: Problem, arguments, *, law: str):
     return jax.vmap(one)(*arguments)
 
 
-def _bounds_of_rows(problem: Problem) -> np.ndarray:
-    # Return the number in `names_of` of each row that can bound a search, see `any_limits.Gain`; faces have two sides.
+def _bound_numbers(problem: Problem) -> np.ndarray:
+    # Return the number in `names_of` of each slack that can bound a search, see `any_limits.Gain`; faces have two
+    # sides.
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
     faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
     counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
     counts |= {"cable_acceleration_max": 2 * robot.n_cables, "speed_max": 1, "acceleration_max": 2}
-    rows = [np.tile(np.arange(faces // 2), 2)]
+    numbers = [np.tile(np.arange(faces // 2), 2)]
     for name, count in counts.items():
         if name in limit_names:
-            rows.append(np.full(count, names.index(name)))
+            numbers.append(np.full(count, names.index(name)))
         elif name.startswith("tension"):
-            rows.append(np.full(count, -1))  # no face is shifted by a tension without a limit
-    return np.concatenate([*rows, [names.index("max_acceleration")]])
+            numbers.append(np.full(count, -1))  # no face is shifted by a tension without a limit
+    return np.concatenate([*numbers, [names.index("max_acceleration")]])

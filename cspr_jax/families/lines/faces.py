@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class LineFaces:
-    """Half-planes steepness * s'' >= offset + slope * s in which a motion along a line stays.
+    """Half-planes steepness * s'' >= offset + offset_change * s in which a motion along a line stays.
 
     A slack over the length of the normal at s, normal + normal_change * s, is the distance of the acceleration from the
     face.
@@ -35,7 +35,7 @@ class LineFaces:
     Fields:
         steepness: (..., n_faces) n . D.
         offset: (..., n_faces) n . g at the start.
-        slope: (..., n_faces) change of n . g from start to end.
+        offset_change: (..., n_faces) change of n . g from start to end.
         normal: (..., n_faces, 3) n at the start, to the side of the other cables.
         normal_change: (..., n_faces, 3) change of n from start to end.
         along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 of rays in the face.
@@ -46,7 +46,7 @@ class LineFaces:
 
     steepness: Array
     offset: Array
-    slope: Array
+    offset_change: Array
     normal: Array
     normal_change: Array
     along: Array
@@ -60,20 +60,20 @@ class LineFaces:
         return self.last > self.first
 
 
-def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:
+def _normals(robot: PointMassRobot, position: Array) -> tuple[Array, Array]:
     # Return the normals to rays that keep their lengths, (n_choices, 3), and their products with the rays,
     # (n_choices, n_cables).
-    rays = robot.base_points - place[None]
+    rays = robot.base_points - position[None]
     if robot.dof == PLANAR:
         level = normals_to(rays[:, [0, 2]].T)
         normal = jnp.stack([level[:, 0], jnp.zeros_like(level[:, 0]), level[:, 1]], axis=1)
     else:
         normal = normals_to(rays.T)
-    size = jnp.linalg.norm(normal, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
+    products = jnp.linalg.norm(normal, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
     along = normal @ rays.T
     spans = np.zeros(along.shape, bool)
     np.put_along_axis(spans, spanning(robot.n_cables, robot.dof), True, axis=1)
-    return normal, jnp.where(spans | (jnp.abs(along) <= FLAT * size), 0.0, along)
+    return normal, jnp.where(spans | (jnp.abs(along) <= FLAT * products), 0.0, along)
 
 
 def line_faces(robot: PointMassRobot, start: Float[Array, "3"], end: Float[Array, "3"], *, in_plane: bool) -> LineFaces:
@@ -94,7 +94,7 @@ def line_faces(robot: PointMassRobot, start: Float[Array, "3"], end: Float[Array
     return LineFaces(
         steepness=normal @ (end - start),
         offset=normal @ free_fall,
-        slope=normal_change @ free_fall,
+        offset_change=normal_change @ free_fall,
         normal=normal,
         normal_change=normal_change,
         along=along,
@@ -120,17 +120,17 @@ class Sides(NamedTuple):
 
     Fields:
         up: (..., n_faces + 1) largest s'' at the start; inf of a face that does not bound it.
-        up_slope: (..., n_faces + 1) its change from start to end.
+        up_change: (..., n_faces + 1) its change from start to end.
         down: (..., n_faces + 1) largest -s'' at the end; inf likewise.
-        down_slope: (..., n_faces + 1) its change from end to start.
+        down_change: (..., n_faces + 1) its change from end to start.
         first: (..., n_faces + 1) s from which on it holds.
         last: (..., n_faces + 1) s up to which it holds.
     """
 
     up: Array
-    up_slope: Array
+    up_change: Array
     down: Array
-    down_slope: Array
+    down_change: Array
     first: Array
     last: Array
 
@@ -140,15 +140,15 @@ def sides(faces: LineFaces, largest: Float[Array, ""]) -> Sides:
     steep = faces.steepness
     is_up, is_down = faces.bounds & (steep < 0.0), faces.bounds & (steep > 0.0)
     over = jnp.where(is_up | is_down, steep, 1.0)
-    start, change = faces.offset / over, faces.slope / over
+    start, change = faces.offset / over, faces.offset_change / over
     flat = jnp.zeros_like(largest)
 
-    def with_largest(is_bounding, value, slope):
-        value, slope = jnp.where(is_bounding, value, jnp.inf), jnp.where(is_bounding, slope, 0.0)
-        return jnp.concatenate([value, largest[None]]), jnp.concatenate([slope, flat[None]])
+    def with_largest(is_bounding, value, change):
+        value, change = jnp.where(is_bounding, value, jnp.inf), jnp.where(is_bounding, change, 0.0)
+        return jnp.concatenate([value, largest[None]]), jnp.concatenate([change, flat[None]])
 
-    up, up_slope = with_largest(is_up, start, change)
-    down, down_slope = with_largest(is_down, -(start + change), change)
+    up, up_change = with_largest(is_up, start, change)
+    down, down_change = with_largest(is_down, -(start + change), change)
     always = jnp.ones_like(largest)[None]
     first, last = jnp.concatenate([faces.first, 0.0 * always]), jnp.concatenate([faces.last, always])
-    return Sides(up, up_slope, down, down_slope, first, last)
+    return Sides(up, up_change, down, down_change, first, last)

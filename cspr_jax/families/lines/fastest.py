@@ -24,19 +24,19 @@ from cspr_jax.verification.proved_verdicts import Verdicts
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Lines that a thread works on at a time, where there is something to search or to prove.
+# Lines that a thread computes at a time, where there is something to search or to prove.
 PART = 256
-Rows = TypeVar("Rows", Durations, Verdicts)
-# Ends nearer to each other than this, over the size of the robot, are one place.
+Table = TypeVar("Table", Durations, Verdicts)
+# Ends nearer to each other than this, over the largest coordinate of its spools, are one position.
 SAME_PLACE = 1e-12
-# Lines that pass a spool nearer than this, over the size of the robot, go through it.
+# Lines that pass a spool nearer than this, over that coordinate, go through it.
 THROUGH = 1e-9
 # Flags that rest at an end raises: no motion avoids `OF_PLACES` there, and no motion starts with `NO_MOTION`.
 OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
-# Duration from which on a motion counts as standing still, over the time of a fall by the size of the robot.
-STILL = 1e4
-# Shares of a duration below which the formulas lose the digits of these shares.
+# Duration from which on a motion counts as standing still, over the time of a fall by the robot's radius and the line.
+STANDING = 1e4
+# Fractions of a duration below which the formulas lose the digits of these fractions.
 SHORT = 1e-6
 
 
@@ -44,9 +44,9 @@ class Fastest(NamedTuple):
     """Fastest motions along n lines, (n,) each.
 
     Fields:
-        durations: finite where there is a motion; 0 where both ends are one place.
+        durations: finite where there is a motion; 0 where both ends are one position.
         verdicts: of the motions, or why there is none.
-        moves: whether there is a motion between two places.
+        moves: whether there is a motion between two positions.
     """
 
     durations: Durations
@@ -73,7 +73,7 @@ def fastest(
     return Fastest(_joined(Durations, durations), _joined(Verdicts, judgements), np.concatenate(moves))
 
 
-def _joined(kind: type[Rows], parts: Sequence[Rows]) -> Rows:
+def _joined(kind: type[Table], parts: Sequence[Table]) -> Table:
     return kind(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts), strict=True)))
 
 
@@ -90,39 +90,39 @@ def _fastest(
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     timings = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
     judgements, may_move, in_place = _at_rest(problem, starts, ends, timings)
-    judged = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
+    verdicts_of = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
         # The durations that the formulas promise without limits need no proof, but where the digits of p or T - p are
         # lost, or the peak of the acceleration may lie beyond its limit.
         is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
         is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
-        rows = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
-        if len(rows) > 0:
-            judgements.replace(rows, judged(starts[rows], ends[rows], timings.part(rows)))
-    # If a place breaks a limit, no other motion mends it.
-    rows = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
-    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(rows) > 0:
-        before, places = timings.part(rows), (starts[rows], ends[rows])
+        indices = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
+        if len(indices) > 0:
+            judgements.replace(indices, verdicts_of(starts[indices], ends[indices], timings.part(indices)))
+    # If an end breaks a limit, no other motion helps.
+    indices = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
+    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(indices) > 0:
+        before, places = timings.part(indices), (starts[indices], ends[indices])
         searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
-        reasons = _without_motion(problem, judged, *places, searched, judgements.verdict[rows])
-        durations, part = _proved(judged, *places, searched, reasons)
-        judgements.replace(rows, part)
-        timings.replace(rows, durations)
+        reasons = _without_motion(problem, verdicts_of, *places, searched, judgements.verdict[indices])
+        durations, part = _proved(verdicts_of, *places, searched, reasons)
+        judgements.replace(indices, part)
+        timings.replace(indices, durations)
     moves = may_move & np.isfinite(timings.duration)
-    rows = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.least == 0.0)))
-    if len(rows) > 0:
-        cells = by_cells(problem, starts[rows], ends[rows], max_acceleration)
-        timings.least[rows] = np.maximum(timings.least[rows], cells)
+    indices = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.lower_bound == 0.0)))
+    if len(indices) > 0:
+        cells = by_cells(problem, starts[indices], ends[indices], max_acceleration)
+        timings.lower_bound[indices] = np.maximum(timings.lower_bound[indices], cells)
     return Fastest(timings, judgements, moves)
 
 
 def _at_rest(
     problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations
 ) -> tuple[Verdicts, np.ndarray, np.ndarray]:
-    # Tell why there can be no motion, where there can be one, and where both ends keep the limits on places.
+    # Tell why there can be no motion, where there can be one, and where both ends keep the limits on positions.
     doubt = FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
-    size = float(np.abs(np.asarray(problem.robot.base_points)).max())
-    is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
+    scale = float(np.abs(np.asarray(problem.robot.base_points)).max())
+    is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * scale
     above, slack = ~(timings.depth > 0.0), timings.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
     # If cables are slack, limits of their tensions say nothing more.
@@ -130,7 +130,7 @@ def _at_rest(
     flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
     rests = (flags == 0) & (timings.rest > doubt)
     open_ended = np.where(timings.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
-    # With limits on places alone the motion of the formulas is shown all the same.
+    # With limits on positions alone the motion of the formulas is shown all the same.
     no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
     may_move = ~above & (timings.rest > doubt) & ~is_same & timings.is_bounded & ((flags & no_motion) == 0)
     verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(FLAGS)
@@ -141,36 +141,36 @@ def _at_rest(
 
 def _touches(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     # Tell whether lines pass through a spool, where a cable has no direction.
-    spools, way = np.asarray(problem.robot.base_points), (ends - starts)[:, None]
-    rays, square = spools[None] - starts[:, None], (way**2).sum(2)
-    part = np.clip((rays * way).sum(2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    apart = np.linalg.norm(rays - part[..., None] * way, axis=2)
-    return (apart <= THROUGH * np.abs(spools).max()).any(1)
+    spools, direction = np.asarray(problem.robot.base_points), (ends - starts)[:, None]
+    rays, square = spools[None] - starts[:, None], (direction**2).sum(2)
+    part = np.clip((rays * direction).sum(2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    distances = np.linalg.norm(rays - part[..., None] * direction, axis=2)
+    return (distances <= THROUGH * np.abs(spools).max()).any(1)
 
 
 def _without_motion(
     problem: Problem,
-    judged: Callable[..., Verdicts],
+    verdicts_of: Callable[..., Verdicts],
     starts: np.ndarray,
     ends: np.ndarray,
     timings: Durations,
     before: np.ndarray,
 ) -> np.ndarray:
-    # Return the flags of lines along which a search finds no motion: those of a motion that nearly stands still, else
+    # Return the flags of lines along which a search finds no motion: those of a motion that is nearly at rest, else
     # those of the motion by formulas.
-    flags, rows = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
-    if len(rows):
+    flags, open_lines = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
+    if len(open_lines):
         long = np.linalg.norm(ends - starts, axis=1) + float(spool_radius(problem.robot))
-        still = np.sqrt(long / float(np.asarray(problem.robot.gravity))) * STILL
-        slow = dataclasses.replace(timings, duration=still, ratio=np.full(len(still), 0.5)).part(rows)
-        slower = judged(starts[rows], ends[rows], slow).verdict
-        is_telling = (slower != 0) & (slower != Verdict.UNDECIDED.value)
-        flags[rows] = np.where(is_telling, slower, flags[rows])
+        slow_time = np.sqrt(long / float(np.asarray(problem.robot.gravity))) * STANDING
+        slow = dataclasses.replace(timings, duration=slow_time, ratio=np.full(len(slow_time), 0.5)).part(open_lines)
+        slower = verdicts_of(starts[open_lines], ends[open_lines], slow).verdict
+        is_informative = (slower != 0) & (slower != Verdict.UNDECIDED.value)
+        flags[open_lines] = np.where(is_informative, slower, flags[open_lines])
     return flags
 
 
 def _proved(
-    judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, timings: Durations, before: np.ndarray
+    verdicts_of: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, timings: Durations, before: np.ndarray
 ) -> tuple[Durations, Verdicts]:
     # Make the durations of a search longer until they are proved; without a motion, the flags from before stand.
     nothing = np.full(len(starts), np.nan)
@@ -178,12 +178,12 @@ def _proved(
     judgements = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
     durations = timings.part(np.arange(len(starts)))
     durations.duration[~np.isfinite(timings.duration)] = np.nan
-    rows = np.flatnonzero(np.isfinite(timings.duration))
+    open_lines = np.flatnonzero(np.isfinite(timings.duration))
     for longer in LONGER:
-        if len(rows) == 0:
+        if len(open_lines) == 0:
             break
-        durations.duration[rows] = timings.duration[rows] * (1.0 + longer)
-        part = judged(starts[rows], ends[rows], durations.part(rows))
-        judgements.replace(rows, part)
-        rows = rows[part.verdict != 0]
+        durations.duration[open_lines] = timings.duration[open_lines] * (1.0 + longer)
+        part = verdicts_of(starts[open_lines], ends[open_lines], durations.part(open_lines))
+        judgements.replace(open_lines, part)
+        open_lines = open_lines[part.verdict != 0]
     return durations, judgements

@@ -28,7 +28,7 @@ class LeastTimes(Columns):
 
     Fields:
         verdict: flags of `Verdict`; 0 where there is a feasible motion.
-        duration: T, s; NaN where there is none, 0 where both ends are one place.
+        duration: T, s; NaN where there is none, 0 where both ends are one position.
         acceleration_time: p, s.
         least_duration: no motion along the line is faster, s.
         duration_ratio: duration over least duration.
@@ -62,10 +62,10 @@ def least_times(
     timings, judgements, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
     )
-    # A refuted motion has no duration; the duration is 0 s where both ends are one place.
+    # A refuted motion has no duration; the duration is 0 s where both ends are one position.
     moves &= (judgements.verdict == 0) | (judgements.verdict == Verdict.UNDECIDED.value)
     nothing = np.where((judgements.verdict == 0) & ~moves, 0.0, np.nan)
-    duration, minimum = (np.where(moves, x, nothing) for x in (timings.duration, timings.least))
+    duration, minimum = (np.where(moves, x, nothing) for x in (timings.duration, timings.lower_bound))
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = np.where(minimum > 0.0, duration / minimum, np.nan)
     return LeastTimes(

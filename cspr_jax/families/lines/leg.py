@@ -14,7 +14,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 
 class TimedLines(Leg):
-    """Any places, joined by straight lines in the least time of their law; see `Leg`."""
+    """Any positions, joined by straight lines in the least time of their law; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, which a line does not have."""
@@ -24,25 +24,25 @@ class TimedLines(Leg):
     def check(self, problem: Problem) -> None:
         """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
         if self.waypoints.plan_file.rule == "thesis" and not in_one_plane(problem.robot):
-            place, key = self.waypoints.robot_file.placed("base_points", self.waypoints.path)
-            raise ConfigError(place, f'{key}: must lie in one plane with rule = "thesis"')
+            path, key = self.waypoints.robot_file.placed("base_points", self.waypoints.path)
+            raise ConfigError(path, f'{key}: must lie in one plane with rule = "thesis"')
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
-        """Join the places; see `Leg.join`."""
+        """Join the positions; see `Leg.join`."""
         starts, ends = self._ends(problem, np.array([z0]))
         answers = self._solved(problem, starts, ends)
         return answers, list(motions_of(answers, starts, ends, law=self.waypoints.family))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
-        """Answers for several depths, on which they depend only by rests in P0; see `Leg.answers`."""
+        """Answers for many depths, on which they depend only by rests in P0; see `Leg.answers`."""
         return self._solved(problem, *self._ends(problem, depths))
 
     def _ends(self, problem: Problem, depths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Return the starts and the ends of all lines, (n_depths * n_lines, 3) each.
         points = np.stack([self.waypoints.points(float(z0)) for z0 in depths])
-        size = float(spool_radius(problem.robot))
-        apart = np.linalg.norm(np.diff(points, axis=1), axis=2)
-        for i in (np.flatnonzero((apart <= AT_P0 * size).any(0)) + 1).tolist():
+        radius = float(spool_radius(problem.robot))
+        distances = np.linalg.norm(np.diff(points, axis=1), axis=2)
+        for i in (np.flatnonzero((distances <= AT_P0 * radius).any(0)) + 1).tolist():
             raise ConfigError(
                 self.waypoints.path,
                 f"{self.waypoints.name(i)}.position: must be another than that of "
@@ -52,9 +52,9 @@ class TimedLines(Leg):
         return points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
 
     def _solved(self, problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineAnswers:
-        keys, law = self.waypoints.plan_file, self.waypoints.family
-        largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
-        rule = keys.rule or "optimum"
+        spec, law = self.waypoints.plan_file, self.waypoints.family
+        largest = np.inf if spec.max_acceleration is None else spec.max_acceleration
+        rule = spec.rule or "optimum"
         answers = timed_lines(problem, starts, ends, law=law, rule=rule, max_acceleration=largest)
         unbounded = np.flatnonzero(answers.verdict == Verdict.NOT_FINITE.value)
         for i in (unbounded % len(self.waypoints) + 1).tolist():

@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 CELLS = 256
-# Numbers that are looked at together: cells by faces by cables.
+# Numbers that are held together: cells by faces by cables.
 TOGETHER = 1 << 20
 
 
 def least_durations(lines: LineSlacks, largest: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """Lower bounds of durations."""
-    size = max(TOGETHER // (CELLS * max(lines.along[0].size, 1)), 1)
-    parts = [slice(i, i + size) for i in range(0, len(largest), size)]
-    return np.concatenate([_least(jax.tree.map(lambda x, part=part: x[part], lines), largest[part]) for part in parts])
+    batch = max(TOGETHER // (CELLS * max(lines.along[0].size, 1)), 1)
+    parts = [slice(i, i + batch) for i in range(0, len(largest), batch)]
+    return np.concatenate([_bounds(jax.tree.map(lambda x, part=part: x[part], lines), largest[part]) for part in parts])
 
 
-def _least(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
+def _bounds(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
     edges = np.linspace(0.0, 1.0, CELLS + 1)
     up, down, speed = _constants(lines, edges)
     up, down = (np.minimum(x, largest[:, None]) for x in (up, down))
@@ -63,12 +63,14 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
     one, none = np.full_like(first, 1.0 / CELLS), np.zeros_like(first)
     s = Jet((first, last), (one, one), (none, none))
     away = s - line.nearest
-    shortness = (away**2 * line.square[..., None] + line.apart) ** -0.5
-    reach = _reach(line, lines.tightest, s, shortness)
-    up, down = (np.where(sign * line.steepness < 0.0, reach, np.inf).min(-1) for sign in (1.0, -1.0))
+    shortness = (away**2 * line.square[..., None] + line.squared_distance) ** -0.5
+    by_faces = _face_bounds(line, lines.tightest, s, shortness)
+    up, down = (np.where(sign * line.steepness < 0.0, by_faces, np.inf).min(-1) for sign in (1.0, -1.0))
     # The rate of a cable over s' grows along the line.
     ends = [(x - line.nearest) * line.square[..., None] for x in (first, last)]
-    rates = [x / np.sqrt((x / line.square[..., None]) ** 2 * line.square[..., None] + line.apart) for x in ends]
+    rates = [
+        x / np.sqrt((x / line.square[..., None]) ** 2 * line.square[..., None] + line.squared_distance) for x in ends
+    ]
     minimum = np.where(rates[0] * rates[1] > 0.0, np.minimum(*np.abs(rates)), 0.0)
     speed = np.full_like(up, np.inf)
     with np.errstate(divide="ignore"):
@@ -87,15 +89,15 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.maximum(up, 0.0), np.maximum(down, 0.0), speed
 
 
-def _reach(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
+def _face_bounds(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
     # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces): inf if the face bounds nothing there.
     first, last = s.value
-    free = [line.offset + line.slope * x for x in (first, last)]
+    free = [line.offset + line.offset_change * x for x in (first, last)]
     along = (s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2)
     ends = np.stack(
         [
             (line.along + line.along_change * x[..., None])
-            * ((x - line.nearest) ** 2 * line.square[..., None] + line.apart)[..., None, :] ** -0.5
+            * ((x - line.nearest) ** 2 * line.square[..., None] + line.squared_distance)[..., None, :] ** -0.5
             for x in (first, last)
         ]
     )

@@ -1,4 +1,4 @@
-"""Maps of least durations along straight lines from one place."""
+"""Maps of least durations along straight lines from one position."""
 
 import numpy as np
 
@@ -17,8 +17,8 @@ class LeastTimeMap(FromPlacesMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        keys = self._keys.trajectory
-        largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
+        spec = self._keys.trajectory
+        largest = np.inf if spec.max_acceleration is None else spec.max_acceleration
         starts, ends = self._starts(cells), self._targets(cells)
         return least_times(self._problem, starts, ends, max_acceleration=largest).arrays()
 

@@ -37,7 +37,7 @@ def s_curve(ratio: Float[Array, ""]) -> Amplitude:
     ratio = jnp.asarray(ratio, float)
     rest, zero, one = 1.0 - ratio, jnp.zeros_like(ratio), jnp.ones_like(ratio)
     up, down = 4.0 / (3.0 * ratio**2), 4.0 / (3.0 * rest**2)
-    # The pieces are expanded about the start, the fastest instant from either side, and the end.
+    # The pieces are expanded about the start, the fastest time from either side, and the end.
     pieces = [
         [zero, zero, zero, up],
         [ratio, 2.0 * one, zero, -up],
@@ -61,8 +61,8 @@ def fixed_law(name: str) -> Amplitude:
     return amplitudes.named("quintic") if name == "quintic" else amplitudes.from_polynomial([0.0, 0.0, 3.0, -2.0])
 
 
-def largest_bend(law: str, ratio: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Largest size of s'' over tau of a law."""
+def largest_second_derivative(law: str, ratio: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Largest |s''| over tau of a law."""
     if law == "s-curve":
         return 4.0 / np.minimum(ratio, 1.0 - ratio)
     return np.full(np.shape(ratio), np.asarray(fixed_law(law).largest)[2])

@@ -1,9 +1,9 @@
 """Smallest slacks of motions along straight lines, with a proof.
 
-Between knots a law of time is a polynomial, and slacks are smooth functions of it, except where the tensions that pull
-least change: one choice of tensions, kept over a block, bounds the slack from below. Slacks are computed at both ends
-of a block, and a bound of the second derivative by interval arithmetic says how far below their chord a slack can lie.
-Blocks whose bound lies below a slack that is attained elsewhere are halved until the two agree.
+Between knots a law of time is a polynomial, and slacks are smooth functions of it, except where the tensions that
+accelerate least change: one choice of tensions, kept over a block, bounds the slack from below. Slacks are computed at
+both ends of a block, and a bound of the second derivative by interval arithmetic says how far below their chord a slack
+can lie. Blocks whose bound lies below a slack that is attained elsewhere are halved until the two agree.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from cspr_jax.families.lines.slacks import Instants, LineSlacks, slacks, tensions_at, tensions_over
+from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensions_at, tensions_over
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.bounds.interval_jets import Jet, lowest
 from cspr_jax.numerics.polynomials import bounds, derivatives, over
@@ -23,7 +23,7 @@ from cspr_jax.numerics.search.block_minima import MinimumBlocks, Proved, smalles
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Numbers that are looked at together, blocks by faces by cables.
+# Numbers that are held together: blocks by faces by cables.
 TOGETHER = 1 << 20
 
 
@@ -32,12 +32,12 @@ def smallest_slacks(
 ) -> Proved:
     """Smallest slacks along lines."""
     scales = np.array([gravity if name in lines.low else 1.0 for name in lines.names])
-    size = max(TOGETHER // max(lines.along[0].size, 1), 1)
+    batch = max(TOGETHER // max(lines.along[0].size, 1), 1)
 
     def values(part: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
         return _of_blocks(lines, laws, durations, part)
 
-    return smallest(_first(laws), len(durations), values, scales, batch_size=size, enough=enough)
+    return smallest(_first(laws), len(durations), values, scales, batch_size=batch, enough=enough)
 
 
 def _first(laws: Amplitude) -> MinimumBlocks:
@@ -63,7 +63,7 @@ def _of_blocks(
     return low, attained
 
 
-def _of_group(line: LineSlacks, name: str, ends: list[Instants], during: Instants) -> tuple[np.ndarray, np.ndarray]:
+def _of_group(line: LineSlacks, name: str, ends: list[LineStates], during: LineStates) -> tuple[np.ndarray, np.ndarray]:
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         if name not in line.low:
             values = np.stack([slacks(line, name, end) for end in ends])
@@ -76,12 +76,12 @@ def _of_group(line: LineSlacks, name: str, ends: list[Instants], during: Instant
     return np.where(beyond, np.inf, low).min(1), values.min((0, 2))
 
 
-def _at_end(s: np.ndarray, end: int, per_time: np.ndarray) -> Instants:
+def _at_end(s: np.ndarray, end: int, per_time: np.ndarray) -> LineStates:
     values = [(x.sum(1) if end else x[:, 0])[:, None] for x in derivatives(s, 2)]
-    return Instants(values[0], (values[1] * per_time) ** 2, values[2] * per_time**2)
+    return LineStates(values[0], (values[1] * per_time) ** 2, values[2] * per_time**2)
 
 
-def _during(s: np.ndarray, per_time: np.ndarray) -> Instants:
+def _during(s: np.ndarray, per_time: np.ndarray) -> LineStates:
     ranges = [bounds(table[:, None]) for table in derivatives(s, 4)]
     speed = Jet(*ranges[1:4]) ** 2 * per_time**2
-    return Instants(Jet(*ranges[:3]), speed, Jet(*ranges[2:]) * per_time**2)
+    return LineStates(Jet(*ranges[:3]), speed, Jet(*ranges[2:]) * per_time**2)

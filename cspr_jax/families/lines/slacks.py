@@ -36,15 +36,15 @@ class LineSlacks:
     Fields:
         square: () |D|^2, m^2.
         nearest: (n_cables,) s at which each cable is shortest, beyond the ends too.
-        apart: (n_cables,) square of its length there, m^2.
-        steepness: (n_faces,) n . D of the faces of both sides, over the size of n at its smallest on the line.
+        squared_distance: (n_cables,) square of its length there, m^2.
+        steepness: (n_faces,) n . D of the faces of both sides, over the smallest norm of n on the line.
         offset: (n_faces,) n . g at the start, likewise; -inf of what bounds nothing.
-        slope: (n_faces,) change of n . g, likewise.
+        offset_change: (n_faces,) change of n . g, likewise.
         along: (n_faces, n_cables) n . r of the rays at the start, likewise.
         along_change: (n_faces, n_cables) its change, likewise.
-        normal_change_square: (n_faces,) square of the size of the change of n, likewise.
+        normal_change_square: (n_faces,) square of the norm of the change of n, likewise.
         narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
-        least_size: (n_faces,) square of the size of n there, likewise.
+        smallest_square: (n_faces,) square of the norm of n there, likewise.
         spans: (n_faces,) whether the cables of the face span it.
         low: smallest tensions over the mass by group of faces, (n_cables,) m/s^2 each.
         high: likewise the largest, inf for none.
@@ -53,15 +53,15 @@ class LineSlacks:
 
     square: Array
     nearest: Array
-    apart: Array
+    squared_distance: Array
     steepness: Array
     offset: Array
-    slope: Array
+    offset_change: Array
     along: Array
     along_change: Array
     normal_change_square: Array
     narrowest: Array
-    least_size: Array
+    smallest_square: Array
     spans: Array
     low: dict[str, Array]
     high: dict[str, Array]
@@ -70,8 +70,8 @@ class LineSlacks:
     @property
     def names(self) -> tuple[str, ...]:
         """Groups of slacks: taut cables, and the limits in their order."""
-        known = {*self.low, *self.largest}
-        return tuple(name for name in (TAUT, *(row.name for row in LIMITS)) if name in known)
+        given = {*self.low, *self.largest}
+        return tuple(name for name in (TAUT, *(limit.name for limit in LIMITS)) if name in given)
 
     @property
     def tightest(self) -> str:
@@ -86,34 +86,36 @@ def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3
     square = direction @ direction
     rays = robot.base_points - start[None]
     nearest = rays @ direction / square
-    apart = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
+    squared_distance = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
     change = jnp.sum(faces.normal_change**2, axis=1)
     narrowest = -jnp.sum(faces.normal * faces.normal_change, axis=1) / jnp.where(change > 0.0, change, 1.0)
     minimum = jnp.sum((faces.normal + narrowest[:, None] * faces.normal_change) ** 2, axis=1)
     at = jnp.clip(narrowest, 0.0, 1.0)
-    size = jnp.linalg.norm(faces.normal + at[:, None] * faces.normal_change, axis=1)
-    spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_change != 0.0)).any(1)
-    over = jnp.where(spans, size, 1.0)
+    norm = jnp.linalg.norm(faces.normal + at[:, None] * faces.normal_change, axis=1)
+    spans = (norm > 0.0) & ((faces.along != 0.0) | (faces.along_change != 0.0)).any(1)
+    over = jnp.where(spans, norm, 1.0)
     low, high = _tensions(problem)
     return LineSlacks(
         square=square,
         nearest=nearest,
-        apart=apart,
+        squared_distance=squared_distance,
         steepness=faces.steepness / over,
         offset=jnp.where(spans, faces.offset / over, -jnp.inf),
-        slope=faces.slope / over,
+        offset_change=faces.offset_change / over,
         along=faces.along / over[:, None],
         along_change=faces.along_change / over[:, None],
         normal_change_square=change / over**2,
         narrowest=narrowest,
-        least_size=minimum / over**2,
+        smallest_square=minimum / over**2,
         spans=spans,
         low=low,
         high=high,
         largest={
-            row.name: jnp.broadcast_to(getattr(problem.limits, row.name), (robot.n_cables if row.per_cable else 1,))
-            for row in limits_set(problem.limits)
-            if row.of_motion and row.quantity != "tension"
+            limit.name: jnp.broadcast_to(
+                getattr(problem.limits, limit.name), (robot.n_cables if limit.per_cable else 1,)
+            )
+            for limit in limits_set(problem.limits)
+            if limit.of_motion and limit.quantity != "tension"
         },
     )
 
@@ -130,7 +132,7 @@ def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
     return low, high
 
 
-class Instants(NamedTuple):
+class LineStates(NamedTuple):
     """State of a motion along a line: arrays, or jets over blocks; their last dimension has length 1.
 
     Fields:
@@ -144,8 +146,8 @@ class Instants(NamedTuple):
     second_derivative: Any
 
 
-def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> Any:
-    """Slacks of a group at instants, or a lower bound of them."""
+def slacks(line: LineSlacks, name: str, at: LineStates, tensions: Any = None) -> Any:
+    """Slacks of a group in states, or a lower bound of them."""
     if name == "speed_max":
         return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
     if name == "acceleration_max":
@@ -153,28 +155,31 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
         return joined(1.0 - fraction, 1.0 + fraction)
     away = at.s - line.nearest
     square = line.square[..., None]
-    length2 = away**2 * square + line.apart
+    length2 = away**2 * square + line.squared_distance
     if name == "cable_speed_max":
         return 1.0 - away**2 * length2**-1.0 * at.speed * (square / line.largest[name]) ** 2
     if name == "cable_acceleration_max":
-        second = length2**-1.5 * at.speed * (square * line.apart) + away * length2**-0.5 * at.second_derivative * square
+        second = (
+            length2**-1.5 * at.speed * (square * line.squared_distance)
+            + away * length2**-0.5 * at.second_derivative * square
+        )
         return joined(1.0 - second / line.largest[name], 1.0 + second / line.largest[name])
-    slack = at.second_derivative * line.steepness - at.s * line.slope - line.offset
+    slack = at.second_derivative * line.steepness - at.s * line.offset_change - line.offset
     if tensions is not None:
-        slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
-    size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.least_size
+        slack = slack - _cable_acceleration(line, at.s, length2**-0.5, tensions)
+    size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.smallest_square
     return slack * size2**-0.5
 
 
-def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
-    # Return the pull of the cables towards the inside of each face, over the mass.
+def _cable_acceleration(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
+    # Return the acceleration that the cables give towards the inside of each face.
     if isinstance(s, Jet):
         return ((s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2) * tensions).summed()
     return ((line.along + line.along_change * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
 
 
 def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
-    """Tensions within their limits that pull least towards the inside of each face."""
+    """Tensions within their limits that accelerate least towards the inside of each face."""
     xp = np if isinstance(s, np.ndarray) else jnp
     low, high = line.low[name][..., None, :], line.high[name][..., None, :]
     along = line.along + line.along_change * s[..., None]
@@ -184,7 +189,7 @@ def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
 def tensions_over(
     line: LineSlacks, name: str, first: Float[np.ndarray, "n 1"], last: Float[np.ndarray, "n 1"]
 ) -> tuple[Float[np.ndarray, "n n_faces n_cables"], Bool[np.ndarray, "n n_faces"]]:
-    """One choice of tensions for all of a stretch, with which slacks are bounded from below."""
+    """One choice of tensions for all of a block, with which slacks are bounded from below."""
     low, high = line.low[name][:, None, :], line.high[name][:, None, :]
     ends = [line.along + line.along_change * s[..., None] for s in (first, last)]
     endless = ~np.isfinite(high)
@@ -193,7 +198,7 @@ def tensions_over(
 
 
 def joined(first: Any, second: Any) -> Any:
-    """Rows of two groups in one."""
+    """Slacks of two groups in one."""
     if isinstance(first, Jet):
         return first.joined(second)
     xp = np if isinstance(first, np.ndarray) else jnp

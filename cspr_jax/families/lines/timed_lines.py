@@ -78,7 +78,7 @@ def timed_lines(
         judgements.room,
         *(nothing, nothing, nothing),
         np.where(moves, timings.ratio, 0.5) * duration,
-        np.where(moves, timings.least, np.nan),
+        np.where(moves, timings.lower_bound, np.nan),
         np.stack([np.where(moves, x + 1, 0) for x in (timings.up, timings.down)], axis=1),
         names_of(problem.robot, problem.limits),
     )
@@ -91,5 +91,5 @@ def motions_of(
     with np.errstate(invalid="ignore"):
         ratios = answers.acceleration_time / answers.duration
     laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))
-    rows = (starts, ends - starts, laws, answers.duration)
-    return [TimedLine(*jax.tree.map(lambda x, i=i: as_float64(x[i]), rows)) for i in range(len(starts))]
+    columns = (starts, ends - starts, laws, answers.duration)
+    return [TimedLine(*jax.tree.map(lambda x, i=i: as_float64(x[i]), columns)) for i in range(len(starts))]

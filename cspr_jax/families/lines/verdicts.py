@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.families.lines.durations import BATCH, Durations, lines_of
-from cspr_jax.families.lines.motion import fixed_law, largest_bend, s_curve
+from cspr_jax.families.lines.motion import fixed_law, largest_second_derivative, s_curve
 from cspr_jax.families.lines.proof import smallest_slacks
 from cspr_jax.families.lines.slacks import TAUT
 from cspr_jax.motion.acceleration_sets import faces_at
@@ -51,7 +51,7 @@ def acceleration_slack(
     max_acceleration: float,
 ) -> Float[np.ndarray, "n"]:
     """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known."""
-    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, timings.ratio)
+    largest = np.linalg.norm(ends - starts, axis=1) * largest_second_derivative(law, timings.ratio)
     with np.errstate(invalid="ignore", divide="ignore"):
         return 1.0 - largest / timings.duration**2 / max_acceleration
 
@@ -66,13 +66,13 @@ def verdicts(
     max_acceleration: float,
     sharp: bool,
 ) -> Verdicts:
-    """Verdicts of motions whose durations are known."""
+    """Verdicts of motions of given durations."""
 
-    def judged(allowed: Problem, rows: np.ndarray) -> Verdicts:
-        parts = starts[rows], ends[rows], timings.part(rows)
+    def verdicts_of(allowed: Problem, indices: np.ndarray) -> Verdicts:
+        parts = starts[indices], ends[indices], timings.part(indices)
         return _verdicts(allowed, *parts, law=law, max_acceleration=max_acceleration, sharp=sharp)
 
-    return with_touched(problem, judged(problem, np.arange(len(starts))), judged)
+    return with_touched(problem, verdicts_of(problem, np.arange(len(starts))), verdicts_of)
 
 
 def _verdicts(
@@ -92,35 +92,37 @@ def _verdicts(
     doubt = FORMULAS_UNDECIDED * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
     flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
-    room, broken, doubtful = _at_ends(problem, starts, ends)
+    limit_margin, broken, doubtful = _at_ends(problem, starts, ends)
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
-        room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
+        limit_margin = np.minimum(
+            limit_margin, plain_slack(name, values / gravity if name.startswith("tension") else values)
+        )
     broken |= np.bitwise_or.reduce(flags, axis=1)
     is_within = (
         acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > FORMULAS_UNDECIDED
     )
     is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
-    return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
+    return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], limit_margin)
 
 
 def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Return smallest slacks, flags and doubts, (n,) each, of limits on places, which the ends decide: lengths are
+    # Return smallest slacks, flags and doubts, (n,) each, of limits on positions, which the ends decide: lengths are
     # convex in s, depths linear.
-    robot, places = problem.robot, np.stack([starts, ends], axis=1)
-    lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
-    each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
+    robot, positions = problem.robot, np.stack([starts, ends], axis=1)
+    lengths = np.linalg.norm(positions[:, :, None] - np.asarray(robot.base_points), axis=3)
+    each: dict[str, Any] = {"depth": positions[..., 2:], "length": lengths}
     scale: Any = scales(robot.n_cables, robot.mass * robot.gravity, spool_radius(robot))
-    room, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
-    for row in limits_set(problem.limits):
-        if not row.of_motion:
-            limit: Any = np.asarray(getattr(problem.limits, row.name))
-            smallest = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
-            room, flags = (
-                np.minimum(room, smallest),
-                flags | np.where(smallest < -FORMULAS_UNDECIDED, row.flag.value, 0),
+    limit_margin, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
+    for limit in limits_set(problem.limits):
+        if not limit.of_motion:
+            allowed: Any = np.asarray(getattr(problem.limits, limit.name))
+            smallest = np.asarray(slack(limit, allowed, each[limit.quantity], scale)).min((1, 2))
+            limit_margin, flags = (
+                np.minimum(limit_margin, smallest),
+                flags | np.where(smallest < -FORMULAS_UNDECIDED, limit.flag.value, 0),
             )
-    return room, flags, ~(room > FORMULAS_UNDECIDED)
+    return limit_margin, flags, ~(limit_margin > FORMULAS_UNDECIDED)
 
 
 def limits_at_rest(
@@ -130,12 +132,14 @@ def limits_at_rest(
     problem = touchable(problem)
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {
-        row.name: getattr(problem.limits, row.name) for row in limits_set(problem.limits) if row.quantity == "tension"
+        limit_row.name: getattr(problem.limits, limit_row.name)
+        for limit_row in limits_set(problem.limits)
+        if limit_row.quantity == "tension"
     }
     fails = partial(_fails_at_rest, problem, starts, ends)
     alone = {name: fails({name: limit}) for name, limit in limits.items()}
-    for row in limits_set(problem.limits):
-        flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
+    for limit_row in limits_set(problem.limits):
+        flags |= np.where(alone.get(limit_row.name, False), limit_row.flag.value, 0)
     if len(limits) > 1:  # of two limits that fail only together, the largest is named
         together = fails(limits) & ~np.any(list(alone.values()), axis=0)
         flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
@@ -145,10 +149,10 @@ def limits_at_rest(
 def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
     # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
     limited = problem._replace(limits=Limits(**limits))
-    margins = [in_batches(partial(_at_rest, limited), places, batch_size=BATCH) for places in (starts, ends)]
+    margins = [in_batches(partial(_at_rest, limited), positions, batch_size=BATCH) for positions in (starts, ends)]
     return np.min(margins, axis=0) < -FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
 
 
 @jax.jit
-def _at_rest(problem: Problem, places):
-    return jax.vmap(lambda x: faces_at(problem.robot, problem.limits, x).margin(jnp.zeros_like(x)))(places)
+def _at_rest(problem: Problem, positions):
+    return jax.vmap(lambda x: faces_at(problem.robot, problem.limits, x).margin(jnp.zeros_like(x)))(positions)

@@ -1,4 +1,4 @@
-"""Leg of the fastest lines between poses, straight ones and bent ones, from which searches of other families begin."""
+"""Leg of the fastest lines between poses, straight or deflected, from which searches of other families begin."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from cspr_jax.config.keys.path import GRID, MAP_GRID, SAME_PLACE, PathTable
 from cspr_jax.curves.files import kept_to, placed_inward
 from cspr_jax.curves.interpolation import continuous
 from cspr_jax.families.paths.batch import least_times
-from cspr_jax.families.paths.geometry.path_specs import course_through
+from cspr_jax.families.paths.geometry.path_specs import path_through
 from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.discrete import discretes
 from cspr_jax.families.paths.least_time.jumping import jumping_motions
@@ -23,25 +23,25 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-# By what part of their length lines are bent. Time in which accelerations rise and fall where poses ask for
+# By what part of their length lines are deflected. Time in which accelerations rise and fall where poses ask for
 # accelerations, s; else they jump.
-BENT, RAMP_TIME = 0.1, 0.05
+DEFLECTION, RAMP_TIME = 0.1, 0.05
 
 
 class FastestLines(Leg):
-    """Poses joined by the fastest of the lines that are proved: straight, or bent to all sides; see `Leg`."""
+    """Poses joined by the fastest of the lines that are proved: straight, or deflected to all sides; see `Leg`."""
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        frame, keys = self.waypoints.frame, self.waypoints.plan_file
-        scene = scene_of(problem.robot, self.waypoints.robot_file, frame, keys, self.waypoints.path, trajectory=keys)
+        frame, spec = self.waypoints.frame, self.waypoints.plan_file
+        scene = scene_of(problem.robot, self.waypoints.robot_file, frame, spec, self.waypoints.path, trajectory=spec)
         positions, units = np.array(frame.outward(self.waypoints.points(z0))), None
         if isinstance(problem.robot, PlatformRobot):
             units = continuous(frame.rotated_quaternions(pose_quaternions(self.waypoints, self.waypoints.points(z0))))
         lines = [
             self._lines(positions[i : i + 2], None if units is None else units[i : i + 2]) for i in range(len(self))
         ]
-        asks = keys.end_accelerations not in (None, "free") or any(pose.rest for pose in self.waypoints.poses)
+        asks = spec.end_accelerations not in (None, "free") or any(pose.rest for pose in self.waypoints.poses)
         ramp_time = RAMP_TIME if asks else 0.0
         left = [_in_order(problem, candidates) for candidates in lines]
         first = [candidates[0].curve for candidates in lines]
@@ -55,13 +55,14 @@ class FastestLines(Leg):
         return answers, motions
 
     def _lines(self, ends: np.ndarray, units: np.ndarray | None) -> list[Section]:
-        # Straight, then bent: sections in the axes of the kernels between places (2, 3) in those of the robot file.
-        straight = course_through(PathTable(kind="line"), ends, units).sections()
+        # Straight, then deflected: sections in the axes of the kernels between positions (2, 3) in those of the robot
+        # file.
+        straight = path_through(PathTable(kind="line"), ends, units).sections()
         turning = None
         if units is not None:
             turning = np.stack([units[0], units.sum(0) / np.linalg.norm(units.sum(0)), units[1]])
         curves = [
-            course_through(PathTable(kind="quintic"), np.stack([ends[0], point, ends[1]]), turning).sections()
+            path_through(PathTable(kind="quintic"), np.stack([ends[0], point, ends[1]]), turning).sections()
             for point in _beside(ends, len(PATTERNS[self.waypoints.robot_file.own_pattern].forces))
         ]
         return [self._placed(section) for section in (*straight, *(section for one in curves for section in one))]
@@ -90,4 +91,4 @@ def _beside(ends: np.ndarray, dimensions: int) -> list[np.ndarray]:
     level = np.array([-along[1], along[0], 0.0]) if np.hypot(*along[:2]) > SAME_PLACE else np.array([0.0, 1.0, 0.0])
     level /= np.linalg.norm(level)
     across = [np.cross(level, along) / length, level][: dimensions - 1]
-    return [middle + sign * BENT * length * side for side in across for sign in (1.0, -1.0)]
+    return [middle + sign * DEFLECTION * length * side for side in across for sign in (1.0, -1.0)]

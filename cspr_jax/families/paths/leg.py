@@ -15,7 +15,7 @@ from cspr_jax.curves.spline import Spline, chained, part
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.paths.answers import PathAnswers, SectionAnswer, feeds_of
 from cspr_jax.families.paths.fastest_lines import FastestLines
-from cspr_jax.families.paths.geometry.path_specs import Course, CourseEnds, FileAxes, course_of, course_through
+from cspr_jax.families.paths.geometry.path_specs import FileAxes, PathEnds, PathSpec, path_of, path_through
 from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.least_time import TOGETHER, LeastTime, least_times_along
 from cspr_jax.motion.answers import Answers
@@ -32,14 +32,14 @@ from cspr_jax.verification.proved_answers import proved_answers
 SAME_DIRECTION = 1e-6
 # Sections that are solved one by one, at most; more are solved together.
 FEW = 16
-# Cells of the grids of all sections: a proof looks at no more blocks.
+# Cells of the grids of all sections: a proof takes no more blocks.
 MOST_CELLS = 100_000
 # Cells above which their number is said before the work begins.
 MANY_CELLS = 10_000
 
 
-class CourseRun(NamedTuple):
-    """Poses that one course joins.
+class PathRun(NamedTuple):
+    """Poses that one path joins.
 
     Fields:
         first: number of the first pose, among those of the leg.
@@ -58,7 +58,7 @@ class Ride(NamedTuple):
     Fields:
         section: in the axes of the kernels.
         settings: of its motion.
-        segments: (k - 1,) numbers of the segments between its k marks.
+        segments: (k - 1,) numbers of the segments between its k knots.
     """
 
     section: Section
@@ -123,22 +123,22 @@ class Paths(Leg):
         # Sections of all runs, in the axes of the kernels; notes of their files.
         waypoints, rides = self.waypoints, list[Ride]()
         self._notes, cells = [], 0
-        places = np.array(waypoints.frame.outward(waypoints.points(z0)))
+        positions = np.array(waypoints.frame.outward(waypoints.points(z0)))
         units = None
         if isinstance(problem.robot, PlatformRobot):
             units = waypoints.frame.rotated_quaternions(pose_quaternions(waypoints, waypoints.points(z0)))
         for run in self._runs:
             try:
-                course = self._course(run, places, units)
-                cells += _cells(course, GRID if run.table.grid is None else run.table.grid)
-                sections = [self._placed(section, course) for section in course.sections()]
+                spec = self._path_spec(run, positions, units)
+                cells += _cells(spec, GRID if run.table.grid is None else run.table.grid)
+                sections = [self._placed(section, spec) for section in spec.sections()]
             except InputError as error:
                 raise ConfigError(waypoints.path, f"{self._key(run)}.{error}") from error
-            self._notes += course.notes
-            places[run.last] = course.tracks[-1].place[-1]
+            self._notes += spec.notes
+            positions[run.last] = spec.parts[-1].position[-1]
             if units is not None:
-                units[run.last] = course.quaternions[-1][-1]
-            count = sum(len(section.marks) - 1 for section in sections)
+                units[run.last] = spec.quaternions[-1][-1]
+            count = sum(len(section.knots) - 1 for section in sections)
             segments = np.full(count, run.first) if run.table.is_whole else np.arange(run.first, run.last)
             rides += _settled(run, sections, segments)
         self._check_going_on(rides)
@@ -147,45 +147,45 @@ class Paths(Leg):
         return rides
 
     @property
-    def _runs(self) -> list[CourseRun]:
-        # A course ends where a pose has a path of its own, before one, and at rest.
-        poses, keys, first, runs = self.waypoints.poses, self.waypoints.plan_file, 0, list[CourseRun]()
-        usual = PathTable() if keys.path is None or keys.is_one_path else keys.path
+    def _runs(self) -> list[PathRun]:
+        # A path ends where a pose has a path of its own, before one, and at rest.
+        poses, spec, first, runs = self.waypoints.poses, self.waypoints.plan_file, 0, list[PathRun]()
+        usual = PathTable() if spec.path is None or spec.is_one_path else spec.path
         for i, pose in enumerate(poses[1:], start=1):
             following = poses[i + 1] if i < len(self) else None
             ends = following is None or following.path is not None or pose.rest
             if pose.path is not None:
-                runs.append(CourseRun(i - 1, i, pose.path.beside(keys.path)))
+                runs.append(PathRun(i - 1, i, pose.path.beside(spec.path)))
             elif ends:
                 # The speeds are those at the ends of the leg.
                 inner = ["start_speed"] * (first > 0) + ["end_speed"] * (i < len(self))
-                runs.append(CourseRun(first, i, usual.model_copy(update=dict.fromkeys(inner))))
+                runs.append(PathRun(first, i, usual.model_copy(update=dict.fromkeys(inner))))
             if pose.path is not None or ends:
                 first = i
         return runs
 
-    def _key(self, run: CourseRun) -> str:
+    def _key(self, run: PathRun) -> str:
         return (
             "path"
             if self.waypoints.poses[run.last].path is None or self.waypoints.plan_file.is_one_path
             else (f"{self.waypoints.name(run.last)}.path")
         )
 
-    def _course(self, run: CourseRun, places: np.ndarray, units: np.ndarray | None) -> Course:
-        # Course of a run, in the axes of the robot file.
+    def _path_spec(self, run: PathRun, positions: np.ndarray, units: np.ndarray | None) -> PathSpec:
+        # Path of a run, in the axes of the robot file.
         waypoints, table = self.waypoints, run.table
         if not table.is_whole:
             chosen = slice(run.first, run.last + 1)
-            return course_through(table, places[chosen], None if units is None else units[chosen])
+            return path_through(table, positions[chosen], None if units is None else units[chosen])
         robot_file = waypoints.robot_file
         if table.orientations is not None and units is None:
             raise InputError("orientations", None, "must be absent for a point mass", problem="given")
         has_start = not waypoints.plan_file.is_one_path and not (
             run.first == 0 and table.has_start and waypoints.poses[0].position is None and not waypoints.poses[0].rest
         )
-        ends = CourseEnds(
-            places[run.first] if has_start else None,
-            None if waypoints.plan_file.is_one_path or table.has_end else places[run.last],
+        ends = PathEnds(
+            positions[run.first] if has_start else None,
+            None if waypoints.plan_file.is_one_path or table.has_end else positions[run.last],
             *(() if units is None else (units[run.first], units[run.last])),
         )
         if has_start and table.start is not None:
@@ -195,11 +195,11 @@ class Paths(Leg):
             reference = reference_of(build_robot(robot_file, waypoints.plan_file, waypoints.path))
             turning = waypoints.frame.rotated_quaternions(reference * BACK)
         axes = FileAxes(robot_file.z_axis, np.eye(3)[1 if robot_file.is_planar else 2], turning)
-        return course_of(table, ends, waypoints.path.parent, axes)
+        return path_of(table, ends, waypoints.path.parent, axes)
 
-    def _placed(self, section: Section, course: Course) -> Section:
+    def _placed(self, section: Section, spec: PathSpec) -> Section:
         # The section in the axes of the kernels, on the plane or the guide of the robot.
-        curve = kept_to(self.waypoints.robot_file.own_pattern, section.curve, is_planar=course.is_planar)
+        curve = kept_to(self.waypoints.robot_file.own_pattern, section.curve, is_planar=spec.is_planar)
         return section._replace(curve=placed_inward(curve, self.waypoints.frame, np.array(IDENTITY)))
 
     def _check_path(self, i: int, table: PathTable) -> None:
@@ -234,11 +234,11 @@ def _parts(count: int) -> str:
     return f"{count:,} {'part' if count == 1 else 'parts'} between stops"
 
 
-def _cells(course: Course, grid: int) -> int:
-    # Cells of the grids of a course; what would not be proved is refused before it takes hours.
-    cells = sum(max(grid, len(track.s) - 1) for track in course.tracks)
+def _cells(spec: PathSpec, grid: int) -> int:
+    # Cells of the grids of a path; what would not be proved is refused before it takes hours.
+    cells = sum(max(grid, len(path.s) - 1) for path in spec.parts)
     if cells > MOST_CELLS:
-        error = f"{_parts(len(course.tracks))}: {cells:,} cells"
+        error = f"{_parts(len(spec.parts))}: {cells:,} cells"
         allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
         raise InputError("grid", None, allowed, problem=error)
     return cells
@@ -250,7 +250,7 @@ def _direction(curve: Spline, piece: int) -> np.ndarray:
     return step / (np.linalg.norm(step) or 1.0)
 
 
-def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> list[Ride]:
+def _settled(run: PathRun, sections: list[Section], segments: np.ndarray) -> list[Ride]:
     # Sections of a run with their settings; the motion is at rest between them.
     table, rides, first = run.table, list[Ride](), 0
     grid = GRID if table.grid is None else table.grid
@@ -258,7 +258,7 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
     for i, section in enumerate(sections):
         start = (table.start_speed or 0.0) * (i == 0)
         end = (table.end_speed or 0.0) * (i == len(sections) - 1)
-        last = first + len(section.marks) - 1
+        last = first + len(section.knots) - 1
         rides.append(Ride(section, SectionSettings(grid, ramp_time, start, end), segments[first:last]))
         first = last
     return rides
@@ -267,16 +267,16 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
 def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:
     """Motion of a ride, with the segments in which its cells lie."""
     middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
-    parts = np.clip(np.searchsorted(ride.section.marks, middles) - 1, 0, len(ride.segments) - 1)
+    parts = np.clip(np.searchsorted(ride.section.knots, middles) - 1, 0, len(ride.segments) - 1)
     return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
 
 
 def cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
     """Parts of a motion between poses."""
     changes = np.flatnonzero(np.diff(ride.segments)) + 1
-    marks = [0.0, *ride.section.marks[changes].tolist(), float(ride.section.marks[-1])]
-    knots = [int(np.argmin(np.abs(fastest.coordinate - mark))) for mark in marks]
+    knots = [0.0, *ride.section.knots[changes].tolist(), float(ride.section.knots[-1])]
+    indices = [int(np.argmin(np.abs(fastest.coordinate - knot))) for knot in knots]
     numbers = ride.segments[[0, *changes.tolist()]].tolist()
     return [
-        (number, part(fastest.motion, *pair)) for number, pair in zip(numbers, itertools.pairwise(knots), strict=True)
+        (number, part(fastest.motion, *pair)) for number, pair in zip(numbers, itertools.pairwise(indices), strict=True)
     ]

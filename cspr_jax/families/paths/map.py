@@ -8,7 +8,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.curves.files import kept_to, placed_inward
 from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.batch import least_times
-from cspr_jax.families.paths.geometry.path_specs import course_through
+from cspr_jax.families.paths.geometry.path_specs import path_through
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.maps.proved_map import ProvedMap, joined_columns, proved_columns
 from cspr_jax.numerics.elementary import as_float64
@@ -19,14 +19,16 @@ from cspr_jax.verification.proved_answers import proved_answers
 class PathsMap(ProvedMap):
     """The least duration of all motions along the path to each target; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Keep what paths need; see `ProvedMap`."""
-        super().__init__(robot_file, keys, file)
-        self._path, self._pattern = keys.trajectory.path or TargetPath(), robot_file.own_pattern
+        super().__init__(robot_file, spec, file)
+        self._path, self._pattern = spec.trajectory.path or TargetPath(), robot_file.own_pattern
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        starts, ends = (self._frame.outward(places) for places in (self._start_places(cells), self._targets(cells)))
+        starts, ends = (
+            self._frame.outward(positions) for positions in (self._start_places(cells), self._targets(cells))
+        )
         tables = [self._path.between(*pair, self._z_axis) for pair in zip(starts.tolist(), ends.tolist(), strict=True)]
         moves = np.array([table is not None for table in tables])
         columns = {name: np.full(len(moves), np.nan) for name in ("duration", "lower_bound")}
@@ -41,27 +43,27 @@ class PathsMap(ProvedMap):
         if fastest is not None:
             columns["duration"][moves] = np.where(np.isfinite(fastest.duration), fastest.duration, np.nan)
             columns["lower_bound"][moves] = fastest.lower_bound
-        still = None
+        resting = None
         if not moves.all():
-            still = proved_answers(self._problem, [self._still(end) for end in ends[~moves]], self._scene)
+            resting = proved_answers(self._problem, [self._at_rest(end) for end in ends[~moves]], self._scene)
             for column in columns.values():
-                column[~moves] = np.where(still.feasible, 0.0, np.nan)
-        parts = [(moves, None if fastest is None else fastest.answers), (~moves, still)]
+                column[~moves] = np.where(resting.feasible, 0.0, np.nan)
+        parts = [(moves, None if fastest is None else fastest.answers), (~moves, resting)]
         return columns | joined_columns(
-            [(rows, proved_columns(answers)) for rows, answers in parts if answers is not None]
+            [(mask, proved_columns(answers)) for mask, answers in parts if answers is not None]
         )
 
     def _sections(self, table: PathTable, start: np.ndarray, end: np.ndarray) -> list[Section]:
         # The path as a plan has it, in the axes of the kernels.
         points = np.array([start, *(table.points or ()), end])
         units = None if self._unit is None else np.tile(self._unit, (len(points), 1))
-        sections = course_through(table, points, units).sections()
+        sections = path_through(table, points, units).sections()
         return [section._replace(curve=self._placed(section.curve)) for section in sections]
 
     def _placed(self, curve: Spline) -> Spline:
         return placed_inward(kept_to(self._pattern, curve, is_planar=False), self._frame, np.array(IDENTITY))
 
-    def _still(self, place: np.ndarray) -> Spline:
-        # A second of rest in a place.
+    def _at_rest(self, position: np.ndarray) -> Spline:
+        # A second of rest in a position.
         unit = None if self._unit is None else as_float64(self._unit[None, None])
-        return self._placed(Spline(as_float64(np.array([0.0, 1.0])), as_float64(place[None, None]), unit))
+        return self._placed(Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), unit))

@@ -1,8 +1,8 @@
 """Paths of motions of any kind, as sections from stop to stop, along which they can be run at other speeds.
 
-With the speed g = sqrt(|v|^2 + (r w)^2) of a motion, where r is the size of the platform, the path has the coordinate
+With the speed g = sqrt(|v|^2 + (r w)^2) of a motion, where r is the radius of the platform, the path has the coordinate
 ds = g dt, the first derivative p' = v / g and the second one (a - p' dg/dt) / g^2; quaternions likewise. At a stop p'
-is the direction of the acceleration, or, where that vanishes too, the limit of v / g, from instants beside the stop;
+is the direction of the acceleration, or, where that vanishes too, the limit of v / g, from samples beside the stop;
 p'' may have no limit there, and is that of the cubic through the end of the first piece.
 """
 
@@ -17,25 +17,25 @@ from cspr_jax.curves.interpolation import hermite
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.families.paths.geometry.section import Section
-from cspr_jax.families.paths.geometry.waypoints import MotionSequence, MovingPlaces, SmoothPart
-from cspr_jax.families.paths.least_time.jumping import PathPace
+from cspr_jax.families.paths.geometry.waypoints import MotionSequence, MovingPoints, SmoothPart
+from cspr_jax.families.paths.least_time.jumping import PathAccelerations
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# Distance from the motion's path above which a piece is halved, m; how often; least time of the motion on it, s, below
-# which second derivatives in time are rounded too much.
+# Distance from the motion's path above which a piece is halved, m; how often; shortest time of the motion on it, s,
+# below which second derivatives in time are rounded too much.
 CLOSE, HALVINGS, BRIEF = 1e-8, 32, 4e-6
 # Angle by which a piece turns, rad, and ratio of the speeds at its ends, above which it is halved, too.
 TURN, RATIO = 0.1, 1.3
 # Pieces of a section at first, and of each smooth part.
 PIECES, FEWEST = 48, 4
-# Instants beside a stop from which the direction there follows, over the smooth part, and their weights.
+# Samples beside a stop from which the direction there follows, over the smooth part, and their weights.
 BESIDE, WEIGHTS = 1e-3 * np.arange(1.0, 5.0), np.array([4.0, -6.0, 4.0, -1.0])
 # Part by which the speed there may differ from the acceleration times the time where the motion sets off evenly.
 UNEVEN = 0.1
-# Inner instants of a piece at which its distance from the path is taken, and between them those of quadrature.
+# Inner samples of a piece at which its distance from the path is taken, and between them those of quadrature.
 QUARTERS = np.linspace(0.0, 1.0, 5)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 AXES = 3
@@ -47,24 +47,24 @@ class Retraced(NamedTuple):
     """Path of motions from one stop to the next.
 
     Fields:
-        section: in the axes of the motions; its marks are ends of motions, and places where
+        section: in the axes of the motions; its knots are ends of motions, and points where
             the motion almost stops.
-        segments: (k - 1,) numbers of the motions between its k marks.
+        segments: (k - 1,) numbers of the motions between its k knots.
         speeds: of the mass centre at its start and at its end, m/s.
-        pace: of the motions.
+        accelerations: of the motions.
         deviation: largest distance of the section from the path, at samples, m.
     """
 
     section: Section
     segments: np.ndarray
     speeds: tuple[float, float]
-    pace: PathPace
+    accelerations: PathAccelerations
     deviation: float
 
 
 @dataclasses.dataclass
 class _Pieces:
-    # Pieces of a section, n: the smooth part that each belongs to, and its shares of the part.
+    # Pieces of a section, n: the smooth part that each belongs to, and its fractions of the part.
     number: np.ndarray
     start: np.ndarray
     end: np.ndarray
@@ -81,14 +81,14 @@ class _Pieces:
         # Times of the pieces, from those of the parts.
         return times[self.number] * (self.end - self.start)
 
-    def within(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # Parts and shares of them at shares of all pieces, (n * k,) each.
-        inner = self.start[:, None] + (self.end - self.start)[:, None] * shares
-        return np.repeat(self.number, len(shares)), inner.ravel()
+    def within(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # Parts and fractions of them at fractions of all pieces, (n * k,) each.
+        inner = self.start[:, None] + (self.end - self.start)[:, None] * fractions
+        return np.repeat(self.number, len(fractions)), inner.ravel()
 
 
-def size_of(robot: AnyRobot) -> float:
-    """Size of a platform, by which angles become lengths along paths."""
+def platform_radius(robot: AnyRobot) -> float:
+    """Radius of a platform, by which angles become lengths along paths."""
     if not isinstance(robot, PlatformRobot):
         return 1.0
     return float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
@@ -98,7 +98,7 @@ def retraced(
     robot: AnyRobot, motions: Sequence[Motion], cells: int, feeds: Sequence[np.ndarray | None] = ()
 ) -> list[Retraced]:
     """Paths of motions that go on from each other."""
-    sequence = MotionSequence(motions, size_of(robot))
+    sequence = MotionSequence(motions, platform_radius(robot))
     paths: list[Retraced] = []
     run: list[SmoothPart] = []
     for part in sequence.parts():
@@ -134,10 +134,10 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
         pieces = pieces.halved(chosen)
     numbers = np.array([part.motion for part in parts])[pieces.number]
     # Nodes are close together where the motion almost stops, too.
-    is_mark = np.diff(numbers, prepend=-1) != 0
+    is_knot = np.diff(numbers, prepend=-1) != 0
     narrow = np.diff(curve.knots) < curve.knots[-1] / cells
-    is_mark[1:] |= narrow[1:] & narrow[:-1]
-    marks = np.asarray(curve.knots)[[*np.flatnonzero(is_mark).tolist(), -1]]
+    is_knot[1:] |= narrow[1:] & narrow[:-1]
+    knots = np.asarray(curve.knots)[[*np.flatnonzero(is_knot).tolist(), -1]]
     ends = motions.inside(parts, pieces.number[[0, -1]], np.array([0.0, 1.0]))
     at_rest = np.array([parts[0].at_rest[0], parts[-1].at_rest[1]])
     start, end = np.where(at_rest, 0.0, np.linalg.norm(ends.velocity[:, :AXES], axis=1)).tolist()
@@ -145,10 +145,10 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
         name = f"segment {numbers[0] + 1}"
         raise InputError(name, None, "must move its mass centre where it begins and ends", problem="it turns in place")
     return Retraced(
-        section=Section(curve, np.array([_feed(motions, part, feeds) for part in parts])[pieces.number], marks),
-        segments=numbers[is_mark],
+        section=Section(curve, np.array([_feed(motions, part, feeds) for part in parts])[pieces.number], knots),
+        segments=numbers[is_knot],
         speeds=(start, end),
-        pace=_pace(motions, parts, pieces, curve),
+        accelerations=_path_accelerations(motions, parts, pieces, curve),
         deviation=float(distances.max()),
     )
 
@@ -165,23 +165,25 @@ def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) 
     return changes
 
 
-def _pace(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, curve: Spline) -> PathPace:
+def _path_accelerations(
+    motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, curve: Spline
+) -> PathAccelerations:
     # Speeds change at both ends of the pieces as they do on their own side.
     start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
-    slopes = []
+    speed_rates = []
     for rates in (start, end):
         speed = np.maximum(rates.speed, np.finfo(float).tiny)
-        slopes.append(np.sum(rates.velocity * rates.acceleration, axis=1) / speed)
-    both = np.stack(slopes, axis=1).ravel()
+        speed_rates.append(np.sum(rates.velocity * rates.acceleration, axis=1) / speed)
+    both = np.stack(speed_rates, axis=1).ravel()
     for edge, near, at_rest in ((0, 1, parts[0].at_rest[0]), (-1, -2, parts[-1].at_rest[1])):
         both[edge] = both[near] if at_rest else both[edge]
-    return PathPace(np.repeat(curve.knots, 2)[1:-1], both)
+    return PathAccelerations(np.repeat(curve.knots, 2)[1:-1], both)
 
 
 def _signs(motions: MotionSequence, parts: list[SmoothPart]) -> np.ndarray:
     # Signs (m,) with which quaternions are continuous from part to part.
     count = np.arange(len(parts))
-    first, last = (motions.inside(parts, count, np.full(len(parts), fraction)).place for fraction in (0.0, 1.0))
+    first, last = (motions.inside(parts, count, np.full(len(parts), fraction)).position for fraction in (0.0, 1.0))
     products = np.sum(first[1:, AXES:] * last[:-1, AXES:], axis=1)
     return np.cumprod(np.append(1.0, np.where(products < 0.0, -1.0, 1.0)))
 
@@ -191,16 +193,16 @@ def _curve(
 ) -> tuple[Spline, np.ndarray]:
     # Hermite pieces, and the largest distance of each from the path of the motions.
     times = pieces.times(motions.times(parts))
-    shares = (QUARTERS[:-1, None] + 0.125 * (_POINTS + 1.0)).ravel()
-    speeds = motions.inside(parts, *pieces.within(shares)).speed.reshape(len(times), len(QUARTERS) - 1, -1)
-    ways = 0.125 * times[:, None] * (speeds @ _WEIGHTS)
-    widths = ways.sum(1)
+    fractions = (QUARTERS[:-1, None] + 0.125 * (_POINTS + 1.0)).ravel()
+    speeds = motions.inside(parts, *pieces.within(fractions)).speed.reshape(len(times), len(QUARTERS) - 1, -1)
+    lengths = 0.125 * times[:, None] * (speeds @ _WEIGHTS)
+    widths = lengths.sum(1)
     knots = np.concatenate([[0.0], np.cumsum(widths)])
 
-    def signed(rates: MovingPlaces, number: np.ndarray) -> MovingPlaces:
+    def signed(rates: MovingPoints, number: np.ndarray) -> MovingPoints:
         ones = np.ones((len(number), AXES))
-        sign = np.concatenate([ones, np.repeat(signs[number, None], rates.place.shape[1] - AXES, axis=1)], axis=1)
-        return rates._replace(place=rates.place * sign, first=rates.first * sign, second=rates.second * sign)
+        sign = np.concatenate([ones, np.repeat(signs[number, None], rates.position.shape[1] - AXES, axis=1)], axis=1)
+        return rates._replace(position=rates.position * sign, first=rates.first * sign, second=rates.second * sign)
 
     start = _derivatives(signed(motions.inside(parts, pieces.number, pieces.start), pieces.number))
     end = _derivatives(signed(motions.inside(parts, pieces.number, pieces.end), pieces.number))
@@ -217,36 +219,36 @@ def _curve(
     values = [np.stack(pair, axis=1).reshape(len(nodes), -1) for pair in zip(start, end, strict=True)]
     table = hermite(nodes, values)
     inner = motions.inside(parts, *pieces.within(QUARTERS[1:-1]))
-    coordinates = (knots[:-1, None] + np.cumsum(ways, axis=1)[:, :-1]).ravel()
-    off = BPoly(np.moveaxis(table, 1, 0), knots)(coordinates) - signed(inner, np.repeat(pieces.number, 3)).place
-    distances = _distances(off, inner, motions.size).reshape(len(times), -1).max(1)
+    coordinates = (knots[:-1, None] + np.cumsum(lengths, axis=1)[:, :-1]).ravel()
+    off = BPoly(np.moveaxis(table, 1, 0), knots)(coordinates) - signed(inner, np.repeat(pieces.number, 3)).position
+    distances = _distances(off, inner, motions.platform_radius).reshape(len(times), -1).max(1)
     quaternion = as_float64(table[:, :, AXES:]) if table.shape[2] > AXES else None
     return Spline(as_float64(knots), as_float64(table[:, :, :AXES]), quaternion), distances
 
 
-def _direction(beside: MovingPlaces, times: np.ndarray) -> np.ndarray:
-    # Derivative along the path at a stop, from instants beside it, by times (2,) s from there on, or before it if < 0.
-    size = np.linalg.norm(beside.acceleration[0])
-    if abs(beside.speed[0] / abs(times[0]) - size) < UNEVEN * size:
+def _direction(beside: MovingPoints, times: np.ndarray) -> np.ndarray:
+    # Derivative along the path at a stop, from samples beside it, by times (2,) s from there on, or before it if < 0.
+    norm = np.linalg.norm(beside.acceleration[0])
+    if abs(beside.speed[0] / abs(times[0]) - norm) < UNEVEN * norm:
         # The motion sets off, or stops, as its acceleration says, which changes little.
-        place, acceleration = (2.0 * rows[0] - rows[1] for rows in (beside.second, beside.acceleration))
-        return np.sign(times[0]) * place / np.linalg.norm(acceleration)
-    way = WEIGHTS @ _derivatives(beside)[1]
-    return way / np.linalg.norm(WEIGHTS @ (beside.velocity / beside.speed[:, None]))
+        direction, acceleration = (2.0 * pair[0] - pair[1] for pair in (beside.second, beside.acceleration))
+        return np.sign(times[0]) * direction / np.linalg.norm(acceleration)
+    mean = WEIGHTS @ _derivatives(beside)[1]
+    return mean / np.linalg.norm(WEIGHTS @ (beside.velocity / beside.speed[:, None]))
 
 
-def _derivatives(rates: MovingPlaces) -> list[np.ndarray]:
-    # Place and its first two derivatives along the path.
+def _derivatives(rates: MovingPoints) -> list[np.ndarray]:
+    # Position and its first two derivatives along the path.
     speed = rates.speed[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):  # at stops
         first = rates.first / speed
-        slope = np.sum(rates.velocity * rates.acceleration, axis=1, keepdims=True) / speed
-        return [rates.place, first, (rates.second - first * slope) / speed**2]
+        speed_rate = np.sum(rates.velocity * rates.acceleration, axis=1, keepdims=True) / speed
+        return [rates.position, first, (rates.second - first * speed_rate) / speed**2]
 
 
-def _distances(off: np.ndarray, rates: MovingPlaces, size: float) -> np.ndarray:
+def _distances(off: np.ndarray, rates: MovingPoints, radius: float) -> np.ndarray:
     # Lengths of what lies across the path; a quaternion is off by half of an angle.
-    off = np.concatenate([off[:, :AXES], 2.0 * size * off[:, AXES:]], axis=1)
-    along = np.concatenate([rates.first[:, :AXES], 2.0 * size * rates.first[:, AXES:]], axis=1)
+    off = np.concatenate([off[:, :AXES], 2.0 * radius * off[:, AXES:]], axis=1)
+    along = np.concatenate([rates.first[:, :AXES], 2.0 * radius * rates.first[:, AXES:]], axis=1)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     return np.linalg.norm(off - np.sum(off * along, axis=1, keepdims=True) * along, axis=1)

@@ -13,12 +13,11 @@ Files, each importing only from those above it:
 
     oscillating_slerp        rotation that swings, section 3.7
     slerp_bounds             bounds of it over a block of time
-    platform_segment         segment between two poses, (3.42) to (3.66)
+    platform_segment         segment between two poses, (3.42) to (3.66), and many of them
     platform_segment_lanes   the same, one lane a segment
     from_rest_lanes          the same from rest, with the fewest operations
     end_acceleration         angular acceleration at the end of a segment, section 3.8
     beta_hat                 values of beta-hat to try, and whether motions can end at poses
-    motions                  many motions in one record, and selections from it
     motion_checker           what searches ask of a checker, whatever the number of cables
     six_cable_proof          the fast proof of motions on six cables
     redundant                motions on more cables
@@ -26,6 +25,6 @@ Files, each importing only from those above it:
     arcs                     smallest numbers of arcs between pairs of poses
     answers                  answers for known numbers of arcs
     pose_targets             smallest numbers of arcs to many poses
-    orientations             orientations of places, section 3.10
+    orientations             orientations at positions, section 3.10
     leg                      platform motions in a plan
 """

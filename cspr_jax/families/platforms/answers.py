@@ -20,8 +20,7 @@ from cspr_jax.families.platforms.arcs import (
 )
 from cspr_jax.families.platforms.end_acceleration import AT_REST
 from cspr_jax.families.platforms.motion_checker import MotionChecker, PlatformChecks
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
 from cspr_jax.motion.answers import Answers
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.fewest_limits import Refused, rank
@@ -80,17 +79,17 @@ def settled(
     if fixed is not None:
         tried = np.where(tried > 0, tried, np.maximum(fixed, 0))
     none = np.flatnonzero(tried == 0)
-    tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
+    tried[none] = best_candidates(checker, candidates.take(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
     is_open = np.zeros(len(tried), bool)
     if is_final:
         smallest, is_open = _confirmed(checker, segments, smallest)
     others = np.flatnonzero((smallest.arcs == 0) & ~is_open)
-    checks.put(others, checker.check(rows(segments, others), tried[others], margins=margins))
-    known = np.flatnonzero(~np.isnan(checks.tolerated))
-    tolerances = checker.tolerated(rows(segments, known), tried[known])
-    checks.tolerated[known] = np.maximum(checks.tolerated[known], tolerances.proved)
-    checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], tolerances.refuted)
+    checks.put(others, checker.check(take_segments(segments, others), tried[others], margins=margins))
+    has_tolerance = np.flatnonzero(~np.isnan(checks.tolerated))
+    tolerances = checker.tolerated(take_segments(segments, has_tolerance), tried[has_tolerance])
+    checks.tolerated[has_tolerance] = np.maximum(checks.tolerated[has_tolerance], tolerances.proved)
+    checks.not_tolerated[has_tolerance] = np.minimum(checks.not_tolerated[has_tolerance], tolerances.refuted)
     duration = checker.durations(segments, tried)
     beta_hats = np.stack(candidates.beta_hats, axis=1)
     if checker.kind.plain:  # beta-hat of the cosine, (3.66)
@@ -115,7 +114,7 @@ def settled(
         beta_hat=beta_hats,
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
-        refuted_at=checks.instant * duration,
+        refuted_at=checks.refuted_tau * duration,
     )
     return answers, segments
 
@@ -126,7 +125,7 @@ def _confirmed(
     # Numbers of arcs whose motions a proof leaves open, or refutes between samples, are undecided; say which these are.
     passed = np.flatnonzero(smallest.arcs > 0)
     if len(passed):
-        part = checker.confirmed(rows(segments, passed), smallest.arcs[passed], smallest.checks.rows(passed))
+        part = checker.confirmed(take_segments(segments, passed), smallest.arcs[passed], smallest.checks.take(passed))
         smallest.checks.put(passed, part)
     is_open = (smallest.arcs > 0) & (smallest.checks.verdict != 0)
     undecided = np.where(is_open & (smallest.undecided == 0), smallest.arcs, smallest.undecided)
@@ -168,7 +167,7 @@ def trials(
 ) -> tuple[Float[np.ndarray, "k"], Candidates]:
     """Motions with each of several values of beta-hat at their ends."""
     cell, option = np.nonzero(~np.isnan(values))
-    return cell, _with_ends(motions.rows(cell), values[cell, option], same=same)
+    return cell, _with_ends(motions.take(cell), values[cell, option], same=same)
 
 
 def reached(
@@ -189,12 +188,12 @@ def reached(
     # Several values of one motion may have passed: in reverse order, the one tried first is written last.
     best = np.flatnonzero(of_trials.arcs > 0)[::-1]
     arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
-    checks.put(cell[best], of_trials.checks.rows(best))
+    checks.put(cell[best], of_trials.checks.take(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
     smallest = FewestArcs(arcs, np.where(undecided < NEVER, undecided, 0), checks)
     # A motion without an answer takes the value at which the fewest limits refuse it, if there is such a value.
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
-    of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs, fixed=fixed)
+    of_limits = refused_by_limits(checker, trial.take(open_ones), max_arcs=max_arcs, fixed=fixed)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
     ranks = rank(checker.flags, of_limits.broken)
     best = np.lexsort((of_limits.arcs, ranks))[::-1]  # the fewest limits, then the fewest arcs, are written last

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.families.platforms.motion_checker import MotionChecker, PlatformChecks
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment, pose_segment
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, pose_segment, take_segments
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -26,14 +25,14 @@ if TYPE_CHECKING:
 BATCH = 2048
 # Number of candidates that are held at a time.
 CANDIDATES = 262_144
-# Instants of the first look, in arcs before the end: first the instants at which most motions fail, the most telling
-# ones first; then the instants at which most of the others fail, with one beside the start, where the amplitude
-# function may bend most. They were chosen one by one among motions of the MSSM with three amplitude functions; other
-# instants would be as right, and slower.
-TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
-OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
+# Times of the screen, in arcs before the end: first those at which most motions fail, in the order of how many they
+# refute; then those at which most of the others fail, with one beside the start, where the second derivative of the
+# amplitude function may be largest. They were chosen one by one among motions of the MSSM with three amplitude
+# functions; other times would be as right, and slower.
+FIRST_TIMES = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
+OTHER_TIMES = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
-# The search for the best of bad candidates looks at so many instants an arc.
+# The search for the best of infeasible candidates takes so many samples an arc.
 COARSEST = 4
 
 
@@ -55,7 +54,7 @@ class Candidates(NamedTuple):
     motion: np.ndarray
     beta_hats: tuple[np.ndarray, np.ndarray]
 
-    def rows(self, index: np.ndarray) -> "Candidates":
+    def take(self, index: np.ndarray) -> "Candidates":
         """Candidates chosen by indices, or by a mask (n,)."""
         return self._replace(motion=self.motion[index], beta_hats=(self.beta_hats[0][index], self.beta_hats[1][index]))
 
@@ -102,7 +101,7 @@ class _Segments:
     def __call__(self, arcs: int, indices: np.ndarray) -> PlatformSegment:
         # The indices (k,) number candidates.
         motion, (first, last) = self._candidates.motion[indices], self._candidates.beta_hats
-        segments = rows(self._of_motions[arcs % 2], motion)
+        segments = take_segments(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
             segments, slerp=segments.slerp._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
         )
@@ -119,7 +118,7 @@ def smallest_arcs(
 ) -> FewestArcs:
     """Smallest number of arcs that passes all tests, of each candidate.
 
-    A few instants refute most motions before they are checked in full.
+    A few samples refute most motions before they are checked in full.
     """
     motion, count = candidates.motion, len(candidates.motion)
     smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
@@ -134,15 +133,17 @@ def smallest_arcs(
         stage(f"arcs {arcs} of {max_arcs}")
         is_open = (last >= arcs) & _is_tried(arcs, only)
         alive = np.flatnonzero((smallest == 0) & is_open[motion])
-        alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
+        alive = _screened(checker, segments, arcs, alive, _times_before_end(arcs, FIRST_TIMES))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
         for group in (alive[first], np.delete(alive, first)):
             group = group[last[motion[group]] >= arcs]
-            group = _sieved(checker, segments, arcs, group, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
+            group = _screened(
+                checker, segments, arcs, group, np.append(BESIDE_START / arcs, _times_before_end(arcs, OTHER_TIMES))
+            )
             if not len(group):
                 continue
-            got = checker.check(segments(arcs, group), np.full(len(group), arcs), whole=False, margins=margins)
+            got = checker.check(segments(arcs, group), np.full(len(group), arcs), full=False, margins=margins)
             checks.put(group, got)
             passed, unsure = (group[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
             smallest[passed] = arcs
@@ -155,12 +156,12 @@ def _is_tried(arcs: int, only: np.ndarray) -> np.ndarray:
     return np.where(only > 0, only == arcs, arcs >= -only)
 
 
-def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
-    # Return instants so many arcs before the end; of a shorter motion the start, where nothing fails.
+def _times_before_end(arcs: int, before: np.ndarray) -> np.ndarray:
+    # Return times so many arcs before the end; of a shorter motion the start, where nothing fails.
     return np.maximum(1.0 - before / arcs, 0.0)
 
 
-def _sieved(
+def _screened(
     checker: MotionChecker,
     segments: _Segments,
     arcs: int,
@@ -169,10 +170,10 @@ def _sieved(
     *,
     limits: bool = True,
 ) -> np.ndarray:
-    # Keep the candidates that none of the instants refutes.
+    # Keep the candidates that none of the samples refutes.
     if not len(alive):
         return alive
-    return alive[~checker.sieve.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
+    return alive[~checker.screen.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
 
 
 def refused_by_limits(
@@ -188,8 +189,8 @@ def refused_by_limits(
     for arcs in range(1, max_arcs + 1):
         stage(f"why not, arcs {arcs} of {max_arcs}")
         alive = np.flatnonzero(~fewest.is_best & _is_tried(arcs, only)[motion])
-        for tau in (TELLING, OTHERS):
-            alive = _sieved(checker, segments, arcs, alive, _instants(arcs, tau), limits=False)
+        for tau in (FIRST_TIMES, OTHER_TIMES):
+            alive = _screened(checker, segments, arcs, alive, _times_before_end(arcs, tau), limits=False)
         if len(alive):
             is_proved, broken = _but_for_limits(checker, segments(arcs, alive), arcs)
             fewest.take(alive[is_proved], np.full(is_proved.sum(), arcs), broken[is_proved])
@@ -199,7 +200,7 @@ def refused_by_limits(
 def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
     # Tell which motions are proved except for limits that they break, (n,), and return these limits, (n, n_criteria).
     each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
-    first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
+    first = checker.check(segments, each, full=False, margins=False, ignored=is_limit)
     is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
     unclear = np.flatnonzero(is_proved & ~(broken == is_limit).all(1))
     for _ in range(int(is_limit.sum())):
@@ -208,7 +209,7 @@ def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int
         left = []
         for ignored in np.unique(broken[unclear], axis=0):
             alike = unclear[(broken[unclear] == ignored).all(1)]
-            again = checker.check(rows(segments, alike), each[alike], margins=False, ignored=ignored)
+            again = checker.check(take_segments(segments, alike), each[alike], margins=False, ignored=ignored)
             is_proved[alike] = again.verdict == 0
             more = checker.breaks(again.slack) & is_limit & ~ignored & (again.verdict != 0)[:, None]
             broken[alike] |= more
@@ -253,7 +254,7 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.sieve.lowest(segments(arcs, indices), arcs, tau)
+        lowest = checker.screen.lowest(segments(arcs, indices), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 

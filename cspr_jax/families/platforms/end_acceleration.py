@@ -1,6 +1,6 @@
 """The angular acceleration of a platform at the end of a segment, beta-hat, thesis section 3.8.
 
-At the end the platform stands still, p'' = -(g / z0) (p - p0), and omega' = beta-hat (g / z0) gamma e: this is (3.71)
+At the end the platform is at rest, p'' = -(g / z0) (p - p0), and omega' = beta-hat (g / z0) gamma e: this is (3.71)
 without its factor 2, since the angle of the rotation is gamma beta. The tensions are linear in beta-hat.
 """
 
@@ -28,18 +28,18 @@ FLAT = 1e-12
 
 
 class Endpoint(NamedTuple):
-    """Tensions per mass and length at an end, offset + beta-hat slope, and the values of beta-hat that they allow.
+    """Tensions per mass and length at an end, offset + beta-hat derivative, and the values of beta-hat that they allow.
 
     Fields:
         offset: (n_cables,) 1/s^2.
-        slope: (n_cables,) 1/s^2.
+        derivative: (n_cables,) 1/s^2.
         preferred: () beta-hat of (3.91), which makes the tensions as equal as possible.
         lowest: () start of the interval (3.92) in which every cable is taut; above `highest` if the interval is empty.
         highest: () end of the interval.
     """
 
     offset: Array
-    slope: Array
+    derivative: Array
     preferred: Array
     lowest: Array
     highest: Array
@@ -53,23 +53,23 @@ def endpoint(
     matrix = -jacobian(robot, position, rotation).T
     eta = robot.gravity / z0  # (3.78)
     moment = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
-    still = jnp.zeros(3)
-    right = jnp.stack([jnp.concatenate([-eta * position, still]), jnp.concatenate([still, moment])], axis=1)
-    offset, slope = solved(matrix, right)[0].T  # (3.79)
+    zero = jnp.zeros(3)
+    right = jnp.stack([jnp.concatenate([-eta * position, zero]), jnp.concatenate([zero, moment])], axis=1)
+    offset, derivative = solved(matrix, right)[0].T  # (3.79)
     # By (3.13) the translation asks for this combined tension, which is eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
-    pull = jnp.mean(cables, axis=0)
-    even = eta * jnp.dot(position, pull) / jnp.dot(pull, pull) / robot.n_cables
-    size = jnp.dot(slope, slope)
-    is_flat = size <= (FLAT * even) ** 2
-    preferred = -jnp.dot(offset - even, slope) / jnp.where(is_flat, 1.0, size)  # (3.91)
-    where_slack = -offset / jnp.where(slope == 0.0, 1.0, slope)
-    lowest = jnp.max(jnp.where(slope > 0.0, where_slack, -jnp.inf))
-    highest = jnp.min(jnp.where(slope < 0.0, where_slack, jnp.inf))
+    mean_ray = jnp.mean(cables, axis=0)
+    even = eta * jnp.dot(position, mean_ray) / jnp.dot(mean_ray, mean_ray) / robot.n_cables
+    squared_norm = jnp.dot(derivative, derivative)
+    is_flat = squared_norm <= (FLAT * even) ** 2
+    preferred = -jnp.dot(offset - even, derivative) / jnp.where(is_flat, 1.0, squared_norm)  # (3.91)
+    where_slack = -offset / jnp.where(derivative == 0.0, 1.0, derivative)
+    lowest = jnp.max(jnp.where(derivative > 0.0, where_slack, -jnp.inf))
+    highest = jnp.min(jnp.where(derivative < 0.0, where_slack, jnp.inf))
     taut = jnp.where(jnp.all(offset > 0.0), jnp.inf, -jnp.inf)
     return Endpoint(
         offset,
-        slope,
+        derivative,
         jnp.where(is_flat, AT_REST, preferred),
         jnp.where(is_flat, -taut, lowest),  # (3.92)
         jnp.where(is_flat, taut, highest),
@@ -84,10 +84,10 @@ def end_state(
     beta_hat: Float[Array, ""],
 ) -> State:
     """State at one end of a segment, of a robot on any number of cables."""
-    eta, still = robot.gravity / z0, jnp.zeros(3)
+    eta, zero = robot.gravity / z0, jnp.zeros(3)
     away = position - rest_point(z0)
     rotation = rotations.matrix(quaternion)
-    return State(position, still, -eta * away, rotation, still, beta_hat * eta * _angle_vector(quaternion))
+    return State(position, zero, -eta * away, rotation, zero, beta_hat * eta * _angle_vector(quaternion))
 
 
 def _angle_vector(quaternion: Array) -> Array:

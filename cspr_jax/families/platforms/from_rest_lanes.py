@@ -1,7 +1,7 @@
 """Transitions of a platform from rest, one lane a segment: the fewest operations that give a state.
 
-Such a motion is a straight swing and a rotation about one axis. All that depends on the number of arcs and on the
-instant is in a table: position and acceleration are one number each times a vector of the segment, and angle, angular
+Such a motion is a straight swing and a rotation about one axis. All that depends on the number of arcs and on time
+is in a table: position and acceleration are one number each times a vector of the segment, and angle, angular
 speed and angular acceleration are linear in the two values of beta-hat. The mechanics are the same as in
 `platform_segment_lanes` (tests compare them).
 """
@@ -29,16 +29,16 @@ class Swings(NamedTuple):
 
     Fields:
         center: the point p0, m.
-        reach: vector from p0 to the end, along the first arc; m.
+        end_offset: vector from p0 to the end, along the first arc; m.
         axis: unit vector of the rotation.
-        angle: whole angle of the envelope, in half turns; (n,).
+        angle: full angle of the envelope, in half turns; (n,).
         start_beta_hat: beta-hat in p0, (n,).
         end_beta_hat: beta-hat at the end, (n,).
         rate: lambda of (3.50), 1/s^2; (n,).
     """
 
     center: Vector
-    reach: Vector
+    end_offset: Vector
     axis: Vector
     angle: Array
     start_beta_hat: Array
@@ -47,7 +47,7 @@ class Swings(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """State of swings at one instant.
+    """State of swings at one time.
 
     Fields:
         position: m.
@@ -81,21 +81,21 @@ def swings(segments: PlatformSegment) -> Swings:
 def rest_table(
     amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, "m"], kind: PlatformMotionKind
 ) -> Float[Array, "m 11"]:
-    """Table that all segments from rest of one number of arcs share."""
+    """Table common to all segments from rest of one number of arcs."""
     theta = math.pi * arcs
     a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
     sine, cosine = sincospi(arcs * tau)
     if kind.variable:  # (3.44)
-        place = a * cosine - a1 * sine
+        position = a * cosine - a1 * sine
         second_derivative = -((a + a2) * cosine + (a1 + a3) * sine)
     else:
-        place = a * cosine
+        position = a * cosine
         second_derivative = (a2 - a) * cosine - 2.0 * a1 * sine
-    beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
+    rotation_law = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
     angles = []
-    for b, b1, b2 in beat:
+    for b, b1, b2 in rotation_law:
         angles.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
-    return jnp.stack([place, second_derivative, *(angle[k] for k in range(3) for angle in angles)], axis=1)
+    return jnp.stack([position, second_derivative, *(angle[k] for k in range(3) for angle in angles)], axis=1)
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
@@ -110,24 +110,24 @@ def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> lis
     steady = ((9.0 * cosine - cosine3) / 8.0, (3.0 * sine3 - 9.0 * sine) / 8.0, 9.0 * (cosine3 - cosine) / 8.0)
     c, c1, c2 = (cosine - cosine3) / 8.0, (3.0 * sine3 - sine) / 8.0, (9.0 * cosine3 - cosine) / 8.0
     parts = [
-        (h * c, h * c1 + slope * c, h * c2 + 2.0 * slope * c1)
-        for h, slope in ((1.0 - tau, -1.0 / theta), (tau, 1.0 / theta))
+        (h * c, h * c1 + h_rate * c, h * c2 + 2.0 * h_rate * c1)
+        for h, h_rate in ((1.0 - tau, -1.0 / theta), (tau, 1.0 / theta))
     ]
     return [steady, *parts]
 
 
 def swing(motions: Swings, row: Float[Array, "11"]) -> Swing:
-    """The state at one instant."""
+    """The state at one time."""
 
     def blended(k):
         return row[k] + motions.start_beta_hat * row[k + 1] + motions.end_beta_hat * row[k + 2]
 
     speed, angular_acceleration = motions.angle * blended(5), motions.angle * blended(8)
     sine, cosine = sincospi(motions.angle * blended(2))
-    pull = motions.rate * row[1]
+    acceleration = motions.rate * row[1]
     return Swing(
-        tuple(h + row[0] * r for h, r in zip(motions.center, motions.reach, strict=True)),
-        tuple(pull * r for r in motions.reach),
+        tuple(h + row[0] * r for h, r in zip(motions.center, motions.end_offset, strict=True)),
+        tuple(acceleration * r for r in motions.end_offset),
         about_axis(motions.axis, sine, cosine),
         motions.rate * speed * speed,
         motions.rate * angular_acceleration,

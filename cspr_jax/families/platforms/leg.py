@@ -55,15 +55,15 @@ class _Poses(Leg):
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families and quaternions that are no orientations."""
-        keys, path = waypoints.plan_file, waypoints.path
-        if keys.inclination is not None:
+        spec, path = waypoints.plan_file, waypoints.path
+        if spec.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
-        if keys.beat in WITHOUT_BETA_HAT:
+        if spec.beat in WITHOUT_BETA_HAT:
             for i, pose in enumerate(waypoints.poses):
                 if pose.beta_hat is not None:
-                    raise ConfigError(path, f'{waypoints.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
+                    raise ConfigError(path, f'{waypoints.name(i)}.beta_hat: must be absent with beat = "{spec.beat}"')
         super().__init__(waypoints)
-        self._kind = PlatformMotionKind(variable=self.variable, plain=keys.beat == "beta_1")
+        self._kind = PlatformMotionKind(variable=self.variable, plain=spec.beat == "beta_1")
         self._given = np.array([_orientation(waypoints.name(i), pose, path) for i, pose in enumerate(waypoints.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class _Poses(Leg):
         ]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
-        """Answers for several depths; see `Leg.answers`."""
+        """Answers for many depths; see `Leg.answers`."""
         return self._search(problem, depths, is_final=False)[0]
 
     def warnings(self, problem: Problem) -> list[str]:
@@ -114,8 +114,8 @@ class _Poses(Leg):
         quaternions = self._quaternions(points[0])
         checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= FEW_SEGMENTS else MANY)
         beta_hats = [
-            self._beta_hats(checker, places, quaternions, float(depth))
-            for places, depth in zip(points, depths, strict=True)
+            self._beta_hats(checker, positions, quaternions, float(depth))
+            for positions, depth in zip(points, depths, strict=True)
         ]
         if len(depths) == 1:
             self._refuse_slack(beta_hats[0])
@@ -128,19 +128,19 @@ class _Poses(Leg):
         of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
         refused = self._refused(checker, trial, of_trials, fixed)
         path = _best_paths(of_trials.arcs, refused.arcs, pairs)
-        best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
+        best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.take(path))
         why = Refused(refused.arcs[path], refused.broken[path])
-        chosen = trial.rows(path)
+        chosen = trial.take(path)
         return settled(checker, chosen, best, refused=why, max_arcs=largest, fixed=fixed, is_final=is_final)
 
     def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
         # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.
         is_open = np.ones(len(trial.z0), bool)
         is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
-        rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
-        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.waypoints.max_arcs, fixed=fixed)
+        open_candidates, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
+        part = refused_by_limits(checker, trial.take(open_candidates), max_arcs=self.waypoints.max_arcs, fixed=fixed)
         refused = Refused(np.zeros(count, int), np.zeros((count, len(checker.flags)), bool))
-        refused.arcs[rows], refused.broken[rows] = part.arcs, part.broken
+        refused.arcs[open_candidates], refused.broken[open_candidates] = part.arcs, part.broken
         return refused
 
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -212,7 +212,7 @@ def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarra
     # Choose a candidate of each segment of each depth, (n_depths * n_segments,). Among candidates that fail, those that
     # only limits refuse come first.
     arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
-    places, last = [], 0
+    chosen, last = [], 0
     for of_depth in pairs:
         costs, starts = [], []
         for first, _ in of_depth:
@@ -222,12 +222,12 @@ def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarra
             costs.append(np.where(counts > 0, counts, np.inf))
         steps = itertools.pairwise(cheapest_path(costs))
         for start, cost, step in zip(starts, costs, steps, strict=True):
-            places.append(start + int(np.ravel_multi_index(step, cost.shape)))
-    return np.array(places)
+            chosen.append(start + int(np.ravel_multi_index(step, cost.shape)))
+    return np.array(chosen)
 
 
 def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
-    # Return the orientation of a pose in the file's axes; an orientation by tilt and torsion follows from the place.
+    # Return the orientation of a pose in the file's axes; an orientation by tilt and torsion follows from the position.
     reference = np.array(IDENTITY)
     if pose.tilt_torsion is not None and pose.quaternion is not None:
         raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
@@ -250,27 +250,26 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
     # the same depth, and the distances between cables.
     where = (position, rotations.matrix(quaternion))
     depth = plane_normal(robot) @ position
-    apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
-    return depth, determinant_ratio(robot, *where), apart
+    distances = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
+    return depth, determinant_ratio(robot, *where), distances
 
 
 def _check_pose(
     robot: PlatformRobot, name: str, position: np.ndarray, quaternion: np.ndarray, path: Path, hint: str
 ) -> None:
-    depth, fraction, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
+    depth, fraction, distances = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
     if not depth > 0.0:
         raise ConfigError(path, f"{name}.position: must be below the spool plane{hint}")
     if not is_regular(abs(fraction)):
         raise ConfigError(
             path, f"{name}: must be another orientation: singular there (relative determinant {fraction:.1g})"
         )
-    if apart.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
+    if distances.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
         raise ConfigError(path, f"{name}: must be another orientation: two cables touch there")
 
 
 def _jumps(amplitude: Amplitude) -> bool:
-    # Tell whether A''' jumps between pieces.
-    # Sums of a few numbers by jax would be programs of their own.
+    # Tell whether A''' jumps between pieces, by NumPy: sums of a few numbers by jax would be programs of their own.
     knots = np.asarray(amplitude.knots)
     before, after = (np.asarray(derivatives(amplitude, knots + s, order=3)[3]) for s in (-NEAR_KNOT, NEAR_KNOT))
     return bool((np.abs(after - before) > JUMP * float(amplitude.largest[3])).any())

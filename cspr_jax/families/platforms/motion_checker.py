@@ -20,9 +20,9 @@ from cspr_jax.verification.robustness.tolerances import Tolerated
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
 
-# Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
+# Cases of a batch for few and for many of them: a batch is always full, and each of these is compiled for.
 FEW, MANY = 256, 2048
-TOUCH = 1e-6  # part of the platform's size: poses of a plan must not be nearer to a contact
+TOUCH = 1e-6  # part of the platform's radius: poses of a plan must not be nearer to a contact
 BESIDE_KNOT = 1e-12
 BASIC = 3  # criteria that are no limits
 
@@ -37,8 +37,8 @@ class PlatformChecks:
         gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
         bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
             is proved, as on more than six cables before `MotionChecker.confirmed`.
-        instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
-            step of it); NaN where it is not refuted, or by contacts that were only sampled.
+        refuted_tau: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a
+            small step of it); NaN where it is not refuted, or by contacts that were only sampled.
         tolerated: (n,) multiple of the uncertainty that the motion is proved to stand, 1 or 0 as far as verdicts need
             it; NaN where no uncertainty is given, or the motion is not feasible as planned.
         not_tolerated: (n,) multiple that the motion does not stand, likewise; infinite where none was found.
@@ -48,7 +48,7 @@ class PlatformChecks:
     slack: np.ndarray
     gap: np.ndarray
     bound: np.ndarray
-    instant: np.ndarray
+    refuted_tau: np.ndarray
     tolerated: np.ndarray
     not_tolerated: np.ndarray
 
@@ -57,21 +57,21 @@ class PlatformChecks:
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
             column[index] = new_column
 
-    def rows(self, index: Float[np.ndarray, "m"]) -> "PlatformChecks":
+    def take(self, index: Float[np.ndarray, "m"]) -> "PlatformChecks":
         """Checks of some of the motions."""
         return PlatformChecks(**{name: values[index] for name, values in vars(self).items()})
 
 
-class Sieve(Protocol):
-    """First look at motions: a few instants that refute most infeasible motions."""
+class Screen(Protocol):
+    """Cheap test of motions: a few samples that refute most infeasible motions."""
 
     def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest slack of the tensions over some instants.
+        """Smallest slack of the tensions over some samples.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
-            tau: (m,) instants.
+            tau: (m,) times.
 
         Returns:
             (n,); -inf where not finite.
@@ -79,12 +79,12 @@ class Sieve(Protocol):
         ...
 
     def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
-        """Mask of the motions that some instants refute.
+        """Mask of the motions that some samples refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
-            tau: (m,) instants, the most telling ones first.
+            tau: (m,) times, those that refute most motions first.
             limits: whether limits may refute motions, too.
 
         Returns:
@@ -108,14 +108,14 @@ class MotionChecker(abc.ABC):
     Fields:
         flags: verdict of each criterion where it is broken: slack cables, singular poses, poses above the spools, then
             limits. Where a criterion does not apply, its slack is NaN or infinite.
-        sieve: the first look, which comes before checks.
+        screen: the cheap test that comes before checks.
     """
 
     flags: tuple[Verdict, ...]
-    sieve: Sieve
+    screen: Screen
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind, *, batch: int) -> None:
-        """Keep the problem, the kind of the motions, and the size of a batch."""
+        """Keep the problem, the kind of the motions, and the number of motions of a batch."""
         self.problem, self.kind, self.batch = problem, kind, batch
 
     def durations(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
@@ -150,7 +150,7 @@ class MotionChecker(abc.ABC):
     def sampled(
         self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"]
     ) -> Float[np.ndarray, "n n_criteria"]:
-        """Smallest slacks at some instants."""
+        """Smallest slacks at some samples."""
 
     @abc.abstractmethod
     def check(
@@ -158,7 +158,7 @@ class MotionChecker(abc.ABC):
         segments: PlatformSegment,
         arcs: Float[np.ndarray, "n"],
         *,
-        whole: bool = True,
+        full: bool = True,
         margins: bool = True,
         ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> PlatformChecks:

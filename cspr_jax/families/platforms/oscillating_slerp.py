@@ -28,7 +28,7 @@ _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 3))])]
 _SMALL, _SERIES = 0.5, 12
 # An envelope shorter than this does not turn.
-_STILL = 1e-12
+_NO_ANGLE = 1e-12
 
 
 class Slerp(NamedTuple):
@@ -65,17 +65,17 @@ def slerp_between(
     along = jnp.dot(first, last)
     beside = last - first * along
     beside = beside - first * jnp.dot(first, beside)
-    size = length(beside)
-    angle = jnp.arctan2(size, along)
+    norm = length(beside)
+    angle = jnp.arctan2(norm, along)
     # Opposite ends are both half a turn from the reference orientation: the envelope goes through the latter.
     identity = jnp.zeros_like(first).at[0].set(1.0)
-    is_opposite = (size < _STILL) & (along < 0.0)
-    across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
+    is_opposite = (norm < _NO_ANGLE) & (along < 0.0)
+    across = jnp.where(norm < _NO_ANGLE, 0.0, beside / jnp.where(norm < _NO_ANGLE, 1.0, norm))
     across = jnp.where(is_opposite, identity, across)
-    return Slerp(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
+    return Slerp(first, across, jnp.where((norm < _NO_ANGLE) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
 
 
-def beat(
+def rotation_law(
     start_beta_hat: Float[Array, ""],
     end_beta_hat: Float[Array, ""],
     fraction: Float[Array, ""],
@@ -85,28 +85,28 @@ def beat(
     """beta_ff of (3.93) and its first two derivatives in tau.
 
     The function is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. With a
-    beta-hat of -1 / share it is beta_1 of (3.66), with 0 beta_0 of (3.67).
+    beta-hat of -1 / fraction it is beta_1 of (3.66), with 0 beta_0 of (3.67).
     """
     omega = math.pi * arcs
-    slope = (end_beta_hat - start_beta_hat) * fraction
-    h = start_beta_hat * fraction + slope * tau  # beta'' over (pi p)^2
+    h_rate = (end_beta_hat - start_beta_hat) * fraction
+    h = start_beta_hat * fraction + h_rate * tau  # beta'' over (pi p)^2
     sine, cosine = sincospi(arcs * tau)
     sine3, cosine3 = sine * (3.0 - 4.0 * sine**2), cosine * (4.0 * cosine**2 - 3.0)
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) / 8.0  # (3.68)
-    rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) / 8.0
+    rate = (h_rate * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) / 8.0
     second_derivative = (
-        2.0 * slope * omega * (3.0 * sine3 - sine) + omega**2 * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
+        2.0 * h_rate * omega * (3.0 * sine3 - sine) + omega**2 * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
     ) / 8.0
     return value, rate, second_derivative
 
 
 @jax.jit
 def orientation(
-    slerp: Slerp, amplitude_values: tuple[Float[Array, ""], ...], beats: tuple[Float[Array, ""], ...]
+    slerp: Slerp, amplitude_values: tuple[Float[Array, ""], ...], betas: tuple[Float[Array, ""], ...]
 ) -> tuple[Float[Array, "4"], Float[Array, "4"], Float[Array, "4"]]:
     """The orientation and its first two derivatives in tau, (3.59) to (3.65)."""
     half = _half_vector(slerp, amplitude_values)
-    beta, beta1, beta2 = beats
+    beta, beta1, beta2 = betas
     return _exponential(
         beta * half[0],
         beta1 * half[0] + beta * half[1],

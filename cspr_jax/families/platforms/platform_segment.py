@@ -15,15 +15,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.platforms.oscillating_slerp import Slerp, beat, orientation, rates, slerp_between
-from cspr_jax.families.platforms.slerp_bounds import beat_bounds, orientation_bounds
+from cspr_jax.families.platforms.oscillating_slerp import Slerp, orientation, rates, rotation_law, slerp_between
+from cspr_jax.families.platforms.slerp_bounds import orientation_bounds, rotation_law_bounds
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.swing_plane import swing_plane
@@ -43,6 +43,7 @@ from cspr_jax.verification.bounds.swing_bounds import swing_bounds
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Num
+
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -100,10 +101,10 @@ def pose_segment(
 
 def duration(segment: PlatformSegment, arcs: Num[Array, ""]) -> Float[Array, ""]:
     """Duration T of a segment, (3.77)."""
-    return math.pi * arcs * jnp.sqrt(_share(segment, arcs) / segment.rate)
+    return math.pi * arcs * jnp.sqrt(_rate_fraction(segment, arcs) / segment.rate)
 
 
-def _share(segment: PlatformSegment, arcs: Array) -> Array:
+def _rate_fraction(segment: PlatformSegment, arcs: Array) -> Array:
     # Return theta_h^2 (n_h - 1) over (pi p)^2. For p = 1 and psi -> 0 the factor 1 - ratio vanishes.
     ratio = segment.precession / arcs
     return (1.0 - ratio) * (1.0 + ratio)
@@ -118,7 +119,7 @@ def motion(
     *,
     kind: PlatformMotionKind = USUAL,
 ) -> State:
-    """The state of the platform at one instant."""
+    """The state of the platform at one time."""
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
     c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
@@ -142,15 +143,15 @@ def quaternion_at(
     *,
     kind: PlatformMotionKind = USUAL,
 ) -> Float[Array, "4"]:
-    """The orientation at one instant."""
+    """The orientation at one time."""
     return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau, kind)[0]
 
 
 def _quaternions(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
-    fraction = _share(segment, arcs)
-    return orientation(segment.slerp, values, beat(*_beta_hats(segment, fraction, kind), fraction, arcs, tau))
+    fraction = _rate_fraction(segment, arcs)
+    return orientation(segment.slerp, values, rotation_law(*_beta_hats(segment, fraction, kind), fraction, arcs, tau))
 
 
 def _beta_hats(segment: PlatformSegment, fraction: Array, kind: PlatformMotionKind) -> tuple[Array, Array]:
@@ -165,19 +166,19 @@ def _swing(
     span = segment.end_radius - segment.start_radius
     r, r1, r2, r3 = segment.start_radius + span * values[0], span * values[1], span * values[2], span * values[3]
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
-    steady = (math.pi * arcs) ** 2 * _share(segment, arcs)
+    steady = (math.pi * arcs) ** 2 * _rate_fraction(segment, arcs)
     sine, cosine = sincospi(segment.sense * arcs * tau)
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
     if variable:
-        place = (r * cosine - r1 * sine / omega, nu * r * sine)
+        position = (r * cosine - r1 * sine / omega, nu * r * sine)
         w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
         w1 = (2.0 * nu**2 * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
-        pace = (sine * w[0], sine * w[1])
-        second_derivative = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+        velocity = (sine * w[0], sine * w[1])
+        acceleration = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
     else:
-        place = (r * cosine, nu * r * sine)
-        pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
-        second_derivative = (
+        position = (r * cosine, nu * r * sine)
+        velocity = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
+        acceleration = (
             (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
             nu * (r2 + r * steady) * sine,
         )
@@ -185,7 +186,7 @@ def _swing(
     def rotated(vector):
         return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
 
-    return rotated(place), rotated(pace), rotated(second_derivative)
+    return rotated(position), rotated(velocity), rotated(acceleration)
 
 
 @jax.tree_util.register_dataclass
@@ -243,8 +244,35 @@ def batch_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: Plat
 
 
 def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Array, block: TimeBounds) -> StateBounds:
-    time, fraction = duration(segment, arcs), _share(segment, arcs)
+    time, fraction = duration(segment, arcs), _rate_fraction(segment, arcs)
     translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
-    beats = beat_bounds(*_beta_hats(segment, fraction, kind), fraction, arcs, block.tau)
-    q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
+    betas = rotation_law_bounds(*_beta_hats(segment, fraction, kind), fraction, arcs, block.tau)
+    q, q1, q2 = orientation_bounds(segment.slerp, block.values, betas)
     return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))
+
+
+def take_segments(segments: PlatformSegment, index: np.ndarray) -> PlatformSegment:
+    """Segments chosen from many."""
+    # `take` is four times as fast as an index where a leaf is no vector.
+    index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
+    return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
+
+
+class Motions(NamedTuple):
+    """Motions of a platform.
+
+    Fields:
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs of each.
+    """
+
+    segments: PlatformSegment
+    arcs: np.ndarray
+
+    def take(self, index: np.ndarray) -> "Motions":
+        """Motions chosen by indices, or by a mask (n,)."""
+        return Motions(take_segments(self.segments, index), self.arcs[index])
+
+    def items(self, index: Float[np.ndarray, "m"]) -> tuple[PlatformSegment, np.ndarray]:
+        """Chosen motions as kernels take them."""
+        return take_segments(self.segments, index), self.arcs[index].astype(float)

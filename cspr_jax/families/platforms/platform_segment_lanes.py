@@ -1,4 +1,4 @@
-"""The state of many platforms on their way, one lane a segment: the fast form of `platform_segment.motion`.
+"""The state of many moving platforms, one lane a segment: the fast form of `platform_segment.motion`.
 
 The mechanics are the same (tests compare both forms), written for numbers instead of small vectors. A transition from
 rest needs neither an ellipse nor a quaternion: it is a straight swing and a rotation about one axis.
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _DEGREE = 22
 
 
-class InstantLanes(NamedTuple):
+class PhaseLanes(NamedTuple):
     """Normalised time, and quantities that depend on it and on the number of arcs alone: () or (n,) each.
 
     Fields:
@@ -61,7 +61,7 @@ class InstantLanes(NamedTuple):
 
 
 class StateLanes(NamedTuple):
-    """The platform at one instant of n segments: tuples of (n,) arrays, derivatives in normalised time.
+    """The platform at one time of n segments: tuples of (n,) arrays, derivatives in normalised time.
 
     Fields:
         position: m.
@@ -81,12 +81,12 @@ class StateLanes(NamedTuple):
 
 
 @jax.jit
-def instant_lanes(
+def phase_lanes(
     amplitude: Amplitude, sense: Float[Array, "..."], arcs: Num[Array, "..."], tau: Float[Array, "..."]
-) -> InstantLanes:
-    """Instant common to segments of the same number of arcs."""
+) -> PhaseLanes:
+    """Phase common to segments of the same number of arcs."""
     a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
-    return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+    return PhaseLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
 def squared_duration(segment: PlatformSegment, arcs: Array) -> Float[Array, "n"]:
@@ -99,96 +99,96 @@ def squared_duration(segment: PlatformSegment, arcs: Array) -> Float[Array, "n"]
 def state(
     segment: PlatformSegment,
     arcs: Array,
-    instant: InstantLanes,
+    phase: PhaseLanes,
     kind: PlatformMotionKind,
     one: Float[Array, ""] | None = None,
 ) -> StateLanes:
     """The state of the platform."""
     if kind.from_rest:
-        place = _straight(segment, arcs, instant, variable=kind.variable)
-        rotation = _about_one_axis(segment, instant, _beat(segment, arcs, instant, kind), one)
+        translation = _straight(segment, arcs, phase, variable=kind.variable)
+        rotation = _about_one_axis(segment, phase, _rotation_law(segment, arcs, phase, kind), one)
     else:
-        place = _ellipse(segment, arcs, instant, variable=kind.variable)
-        rotation = _exponential(*_half_vector(segment, instant, _beat(segment, arcs, instant, kind)))
+        translation = _ellipse(segment, arcs, phase, variable=kind.variable)
+        rotation = _exponential(*_half_vector(segment, phase, _rotation_law(segment, arcs, phase, kind)))
     center = tuple(segment.center[:, i] for i in range(3))
-    position = tuple(h + c for h, c in zip(center, place[0], strict=True))
-    return StateLanes(position, place[1], place[2], *rotation)
+    position = tuple(h + c for h, c in zip(center, translation[0], strict=True))
+    return StateLanes(position, translation[1], translation[2], *rotation)
 
 
-def _straight(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
-    omega, size = segment.sense * math.pi * arcs, segment.end_radius
+def _straight(segment: PlatformSegment, arcs: Array, phase: PhaseLanes, *, variable: bool) -> tuple[Vector, ...]:
+    omega, radius = segment.sense * math.pi * arcs, segment.end_radius
     if variable:
-        inner = instant.a * omega * omega + instant.a2
-        place = instant.a * instant.cosine - instant.a1 * instant.sine / omega
-        pace = -inner * instant.sine / omega
-        second_derivative = -(inner * instant.cosine + (instant.a1 * omega + instant.a3 / omega) * instant.sine)
+        inner = phase.a * omega * omega + phase.a2
+        position = phase.a * phase.cosine - phase.a1 * phase.sine / omega
+        velocity = -inner * phase.sine / omega
+        acceleration = -(inner * phase.cosine + (phase.a1 * omega + phase.a3 / omega) * phase.sine)
     else:
-        place = instant.a * instant.cosine
-        pace = instant.a1 * instant.cosine - instant.a * omega * instant.sine
-        second_derivative = (
-            instant.a2 - instant.a * omega * omega
-        ) * instant.cosine - 2.0 * instant.a1 * omega * instant.sine
-    return tuple(tuple(segment.plane[:, i, 0] * (size * x) for i in range(3)) for x in (place, pace, second_derivative))
+        position = phase.a * phase.cosine
+        velocity = phase.a1 * phase.cosine - phase.a * omega * phase.sine
+        acceleration = (phase.a2 - phase.a * omega * omega) * phase.cosine - 2.0 * phase.a1 * omega * phase.sine
+    return tuple(
+        tuple(segment.plane[:, i, 0] * (radius * x) for i in range(3)) for x in (position, velocity, acceleration)
+    )
 
 
-def _ellipse(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
+def _ellipse(segment: PlatformSegment, arcs: Array, phase: PhaseLanes, *, variable: bool) -> tuple[Vector, ...]:
     # Compute the same as `platform_segment._swing`.
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
     span = segment.end_radius - segment.start_radius
-    r, r1, r2, r3 = segment.start_radius + span * instant.a, span * instant.a1, span * instant.a2, span * instant.a3
+    r, r1, r2, r3 = segment.start_radius + span * phase.a, span * phase.a1, span * phase.a2, span * phase.a3
     steady = omega * omega * (1.0 - nu) * (1.0 + nu)
-    lateral, axial = sincospi(segment.sense * segment.precession * instant.tau)
-    sine, cosine = instant.sine, instant.cosine
+    lateral, axial = sincospi(segment.sense * segment.precession * phase.tau)
+    sine, cosine = phase.sine, phase.cosine
     if variable:
         w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
         w1 = (2.0 * nu * nu * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
-        place = (r * cosine - r1 * sine / omega, nu * r * sine)
-        pace = (sine * w[0], sine * w[1])
-        second_derivative = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+        position = (r * cosine - r1 * sine / omega, nu * r * sine)
+        velocity = (sine * w[0], sine * w[1])
+        acceleration = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
     else:
-        place = (r * cosine, nu * r * sine)
-        pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
-        second_derivative = (
+        position = (r * cosine, nu * r * sine)
+        velocity = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
+        acceleration = (
             (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
             nu * (r2 + r * steady) * sine,
         )
     vectors = []
-    for x, y in (place, pace, second_derivative):
+    for x, y in (position, velocity, acceleration):
         along, across = axial * x + lateral * y, axial * y - lateral * x
         vectors.append(tuple(segment.plane[:, i, 0] * along + segment.plane[:, i, 1] * across for i in range(3)))
     return tuple(vectors)
 
 
-def _beat(
-    segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
+def _rotation_law(
+    segment: PlatformSegment, arcs: Array, phase: PhaseLanes, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
-    # Compute the same as `oscillating_slerp.beat`, at the phase that the instant knows.
+    # Compute the same as `oscillating_slerp.rotation_law`, at this phase.
     slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     fraction = (1.0 - nu) * (1.0 + nu)
-    sine, cosine = segment.sense * instant.sine, instant.cosine
+    sine, cosine = segment.sense * phase.sine, phase.cosine
     if kind.plain:  # beta_1
         return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
-    h = slerp.start_beta_hat * fraction + slope * instant.tau
+    h_rate = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
+    h = slerp.start_beta_hat * fraction + h_rate * phase.tau
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) * 0.125
-    rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
-    second_derivative = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (
+    rate = (h_rate * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
+    second_derivative = 2.0 * h_rate * omega * (3.0 * sine3 - sine) + omega * omega * (
         9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine
     )
     return value, rate, second_derivative * 0.125
 
 
 def _about_one_axis(
-    segment: PlatformSegment, instant: InstantLanes, beats: tuple[Array, ...], one: Array | None
+    segment: PlatformSegment, phase: PhaseLanes, betas: tuple[Array, ...], one: Array | None
 ) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
-    beta, beta1, beta2 = beats
+    beta, beta1, beta2 = betas
     full = 2.0 * segment.slerp.angle
-    sine, cosine = materialized(sincospi(full * beta * instant.a / math.pi), one)
-    rate = full * (beta1 * instant.a + beta * instant.a1)
-    second_derivative = full * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
+    sine, cosine = materialized(sincospi(full * beta * phase.a / math.pi), one)
+    rate = full * (beta1 * phase.a + beta * phase.a1)
+    second_derivative = full * (beta2 * phase.a + 2.0 * beta1 * phase.a1 + beta * phase.a2)
     return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(second_derivative * e for e in axis)
 
 
@@ -208,12 +208,12 @@ _RATIO = _angle_ratio_coefficients()
 
 
 def _half_vector(
-    segment: PlatformSegment, instant: InstantLanes, beats: tuple[Array, ...]
+    segment: PlatformSegment, phase: PhaseLanes, betas: tuple[Array, ...]
 ) -> tuple[Vector, Vector, Vector]:
     # Return half of the rotation vector and its derivatives, as in `oscillating_slerp`.
-    slerp, (beta, beta1, beta2) = segment.slerp, beats
-    sine, cosine = sincospi(slerp.angle * instant.a / math.pi)
-    rate, second_derivative = slerp.angle * instant.a1, slerp.angle * instant.a2
+    slerp, (beta, beta1, beta2) = segment.slerp, betas
+    sine, cosine = sincospi(slerp.angle * phase.a / math.pi)
+    rate, second_derivative = slerp.angle * phase.a1, slerp.angle * phase.a2
     q = [slerp.start[:, i] * cosine + slerp.across[:, i] * sine for i in range(4)]
     along = [slerp.across[:, i] * cosine - slerp.start[:, i] * sine for i in range(4)]
     q1 = [x * rate for x in along]

@@ -15,16 +15,17 @@ from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
 if TYPE_CHECKING:
     from jaxtyping import Float, Num
 
-# Rounding of the derivatives that recurrences give, in parts of their size or of 1, is less.
+# Rounding of the derivatives that recurrences give, in parts of their magnitude or of 1, is less.
 DERIVATIVE_ERROR = 1e-12
-# No derivative in y = r^2 of cos r, and of sin r / r of orders 0 to 2, bends more: the n-th derivative of the latter is
-# a spherical Bessel function, (-1/2)^n j_n(r) / r^n, and largest at 0, where it is (-1/2)^n / (1 3 5 ... (2 n + 1)).
-_BENDS = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
+# No derivative in y = r^2 of cos r, and of sin r / r of orders 0 to 2, has a larger second derivative: the n-th
+# derivative of the latter is a spherical Bessel function, (-1/2)^n j_n(r) / r^n, and largest at 0, where it is (-1/2)^n
+# / (1 3 5 ... (2 n + 1)).
+_SECOND_DERIVATIVES = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
 
 Bounds3 = tuple[AffineBounds, AffineBounds, AffineBounds]
 
 
-def beat_bounds(
+def rotation_law_bounds(
     start_beta_hat: Float[Array, ""],
     end_beta_hat: Float[Array, ""],
     fraction: Float[Array, ""],
@@ -32,19 +33,19 @@ def beat_bounds(
     tau: AffineBounds,
 ) -> Bounds3:
     """Bounds of the time function of the rotation and its first two derivatives in tau."""
-    omega, slope = math.pi * arcs, (end_beta_hat - start_beta_hat) * fraction
-    more = tau * slope + (1.0 + start_beta_hat * fraction)  # 1 + h
+    omega, h_rate = math.pi * arcs, (end_beta_hat - start_beta_hat) * fraction
+    more = tau * h_rate + (1.0 + start_beta_hat * fraction)  # 1 + h
     (sine, cosine), (sine3, cosine3) = sincospi(tau * arcs), sincospi(tau * (3.0 * arcs))
     value = cosine + more * (cosine - cosine3) * 0.125
-    rate = (cosine - cosine3) * (0.125 * slope) + (more * (3.0 * sine3 - sine) * 0.125 - sine) * omega
-    second_derivative = (3.0 * sine3 - sine) * (0.25 * slope * omega)
+    rate = (cosine - cosine3) * (0.125 * h_rate) + (more * (3.0 * sine3 - sine) * 0.125 - sine) * omega
+    second_derivative = (3.0 * sine3 - sine) * (0.25 * h_rate * omega)
     return value, rate, second_derivative + (more * (9.0 * cosine3 - cosine) * 0.125 - cosine) * omega**2
 
 
-def orientation_bounds(slerp: Slerp, values: tuple[AffineBounds, ...], beats: Bounds3) -> Bounds3:
+def orientation_bounds(slerp: Slerp, values: tuple[AffineBounds, ...], betas: Bounds3) -> Bounds3:
     """Bounds of the orientation and its first two derivatives in tau."""
     u, u1, u2 = _half_vector(slerp, values)
-    beta, beta1, beta2 = beats
+    beta, beta1, beta2 = betas
     return _exponential(beta * u, beta1 * u + beta * u1, beta2 * u + 2.0 * (beta1 * u1) + beta * u2)
 
 
@@ -62,7 +63,8 @@ def _half_vector(slerp: Slerp, values: tuple[AffineBounds, ...]) -> Bounds3:
 
 
 def _angle_ratio(s: AffineBounds) -> Bounds3:
-    # Signs of the derivatives alternate, and all grow in size as s falls: they bend most at the lower end.
+    # Signs of the derivatives alternate, and all grow in magnitude as s falls: their second derivatives are largest at
+    # the lower end.
     low = s.low()
     middle = angle_ratio(s.middle, 1.0 - s.middle**2, orders=4)
     steepest = angle_ratio(low, 1.0 - low**2, orders=5)
@@ -87,16 +89,16 @@ def _exponential(u: AffineBounds, u1: AffineBounds, u2: AffineBounds) -> Bounds3
 def _sinc(y: AffineBounds) -> tuple[AffineBounds, ...]:
     # Their second derivatives may change sign.
     cosine, *derivatives = sinc(y.middle)
-    slopes = (-0.5 * derivatives[0], *derivatives[1:])
+    firsts = (-0.5 * derivatives[0], *derivatives[1:])
     half = 0.5 * y.half_range() ** 2
     return tuple(
         _widened(
-            AffineBounds(value, slope * y.linear, jnp.abs(slope) * y.radius + second_derivative * half),
+            AffineBounds(value, first * y.linear, jnp.abs(first) * y.radius + second * half),
             1.0 + y.half_range(),
         )
-        for value, slope, second_derivative in zip((cosine, *derivatives[:3]), slopes, _BENDS, strict=True)
+        for value, first, second in zip((cosine, *derivatives[:3]), firsts, _SECOND_DERIVATIVES, strict=True)
     )
 
 
-def _widened(f: AffineBounds, size: Array) -> AffineBounds:
-    return f._replace(radius=f.radius + DERIVATIVE_ERROR * jnp.abs(size))
+def _widened(f: AffineBounds, scale: Array) -> AffineBounds:
+    return f._replace(radius=f.radius + DERIVATIVE_ERROR * jnp.abs(scale))

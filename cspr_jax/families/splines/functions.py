@@ -31,7 +31,7 @@ class FunctionMotion:
         time: () duration, s.
         z0: () depth at which slacks are normalised, m.
         factor: () by which time is stretched.
-        function: gives positions (3,) m, of a platform with quaternions behind them (7,), at instants () s; known when
+        function: gives positions (3,) m, of a platform with quaternions behind them (7,), at times () s; known when
             a function is compiled.
     """
 
@@ -54,9 +54,9 @@ class FunctionMotion:
             return jax.jvp(value, (t,), (jnp.ones_like(t),))[1]
 
         t = tau * self.duration()
-        place, (first, second) = value(t), jax.jvp(rate, (t,), (jnp.ones_like(t),))
-        turning = turning_of(place[3:], first[3:], second[3:]) if place.shape[0] > len("xyz") else ()
-        return State(place[:3], first[:3], second[:3], *turning)
+        position, (first, second) = value(t), jax.jvp(rate, (t,), (jnp.ones_like(t),))
+        turning = turning_of(position[3:], first[3:], second[3:]) if position.shape[0] > len("xyz") else ()
+        return State(position[:3], first[:3], second[:3], *turning)
 
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
@@ -72,22 +72,20 @@ def function_motion(
 ) -> FunctionMotion:
     """Motion that a function gives in the axes of a robot file, in those of the kernels."""
     try:
-        size = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
+        shape = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
     except TypeError as error:
         raise InputError("times", None, "must be one of jax.numpy", problem="jax cannot follow it") from error
     allowed = ((3,), (7,)) if is_platform else ((3,),)
-    if size not in allowed:
-        raise InputError(
-            "times", None, f"must give values of shape {' or '.join(map(str, allowed))}", problem=f"{size}"
-        )
+    if shape not in allowed:
+        raise InputError("times", None, f"must give values of shape {' or '.join(map(str, allowed))}", problem=f"{shape}")
     back = jnp.asarray(reference * np.array([1.0, -1.0, -1.0, -1.0]))
 
     def inward(t: Array) -> Array:
         value = jnp.asarray(function(t), float)
-        place = jnp.asarray(frame.inward(value[:3]))
+        position = jnp.asarray(frame.inward(value[:3]))
         if not is_platform:
-            return place
-        turning = jnp.asarray(frame.rotated_quaternions(value[3:])) if size == (7,) else jnp.eye(4)[0]
-        return jnp.concatenate([place, rotations.product(turning, back)])
+            return position
+        turning = jnp.asarray(frame.rotated_quaternions(value[3:])) if shape == (7,) else jnp.eye(4)[0]
+        return jnp.concatenate([position, rotations.product(turning, back)])
 
     return FunctionMotion(as_float64(duration), as_float64(1.0), as_float64(1.0), inward)

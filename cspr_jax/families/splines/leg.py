@@ -192,10 +192,10 @@ class Splines(Leg):
                     )
 
     def _curve(self, problem: Problem, z0: float, first: int, last: int) -> Spline:
-        waypoints, keys = self.waypoints, self.waypoints.plan_file
+        waypoints, spec = self.waypoints, self.waypoints.plan_file
         chosen, frame = slice(first, last + 1), waypoints.frame
         poses, points = waypoints.poses[chosen], waypoints.points(z0)
-        interpolation = keys.interpolation or "cubic"
+        interpolation = spec.interpolation or "cubic"
         rates = {name: np.array([self._rate(pose, name) for pose in poses]) for name in ("velocity", "acceleration")}
         velocities, accelerations = (frame.rotated(values) for values in rates.values())
         if self._is_hermite:
@@ -209,7 +209,7 @@ class Splines(Leg):
                 points[chosen],
                 pose_quaternions(waypoints, points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
                 interpolation=interpolation,
-                ends=keys.ends or "rest",
+                ends=spec.ends or "rest",
                 **derivatives,
             )
             pattern = waypoints.robot_file.own_pattern

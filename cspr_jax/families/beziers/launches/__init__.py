@@ -2,9 +2,8 @@
 
 Files, each importing only from those above it:
 
-    through_release    the segment through a release
+    release            the segment through a release, and bounds within which one is searched for
     launches           launches to a target, with all that is left open chosen
-    release_bounds     bounds within which a release is looked for
     launch_range       releases for many landing places
     launch_range_map   maps of launches
 """

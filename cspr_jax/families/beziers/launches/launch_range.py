@@ -1,6 +1,6 @@
 """Range of launches: to each landing place the release, and the one Bezier segment from rest, that reach it.
 
-Unknowns are the place of the release, the time of the flight, the duration of the segment, and when the object is
+Unknowns are the position of the release, the time of the flight, the duration of the segment, and when the object is
 released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
 """
 
@@ -14,8 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.beziers.launches.release_bounds import ReleaseBounds
-from cspr_jax.families.beziers.launches.through_release import through
+from cspr_jax.families.beziers.launches.release import ReleaseBounds, through
 from cspr_jax.families.beziers.margins import depths_of
 from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.families.beziers.sequences import margins_of
@@ -36,7 +35,7 @@ UNKNOWNS, POPULATION = 6, 64
 # Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
 # there, and proved later.
 EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
-# Places at a time where the answers are made.
+# Landing places at a time where the answers are made.
 TOGETHER = 512
 
 
@@ -88,8 +87,8 @@ class LaunchRange(Releases):
     release_time: np.ndarray
 
 
-def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
-    problem, bounds = known
+def _shot(problem_and_bounds: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
+    problem, bounds = problem_and_bounds
     unknowns = bounds.low + (bounds.high - bounds.low) * x
     position, (flight, duration), fraction = unknowns[:3], jnp.exp(unknowns[3:5]), unknowns[5]
     velocity = aimed(position, question.target, problem.robot.gravity, flight)
@@ -97,16 +96,18 @@ def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: 
     return Shot(position, velocity, flight, fraction, Bezier(question.start, middle, end, duration, question.z0))
 
 
-def _energy(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> tuple[Array, Array]:
-    # Kinetic energy at the release over weight and size of the robot, and the smallest margin.
-    robot, shot = known[0].robot, _shot(known, question, x)
-    margins = margins_of(known[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
+def _energy(
+    problem_and_bounds: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array
+) -> tuple[Array, Array]:
+    # Kinetic energy at the release over weight and radius of the robot, and the smallest margin.
+    robot, shot = problem_and_bounds[0].robot, _shot(problem_and_bounds, question, x)
+    margins = margins_of(problem_and_bounds[0], jax.tree.map(lambda x: jnp.asarray(x)[None], shot.motion), SAMPLES)
     return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
 
 
 @jax.jit
-def _shots(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, Array]) -> Shot:
-    return jax.vmap(lambda question, x: _shot(known, question, x))(*cases)
+def _shots(problem_and_bounds: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, Array]) -> Shot:
+    return jax.vmap(lambda question, x: _shot(problem_and_bounds, question, x))(*cases)
 
 
 def launch_range(
@@ -119,28 +120,32 @@ def launch_range(
     """Launches of least speed, and the largest margins, to landing places."""
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
     margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
-    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)
+    unknowns = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)
     parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
     answers = [
-        _answers((problem, bounds), jax.tree.map(lambda x, s=chunk: x[s], (question, places))) for chunk in parts
+        _answers((problem, bounds), jax.tree.map(lambda x, s=chunk: x[s], (question, unknowns))) for chunk in parts
     ]
     return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in answers]) for name in vars(answers[0])})
 
 
-def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]) -> LaunchRange:
-    # Put one candidate for every place and margin asked for into one row: the margins change fastest.
-    count, tracks, _ = cases[1].shape
-    question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
+def _answers(
+    problem_and_bounds: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]
+) -> LaunchRange:
+    # Put one candidate for every landing place and margin behind another: the margins change fastest.
+    count, n_margins, _ = cases[1].shape
+    question = jax.tree.map(lambda x: np.repeat(x, n_margins, axis=0), cases[0])
     shots = in_batches(
-        lambda batch: _shots(known, batch), (question, cases[1].reshape(count * tracks, -1)), batch_size=BATCH
+        lambda batch: _shots(problem_and_bounds, batch),
+        (question, cases[1].reshape(count * n_margins, -1)),
+        batch_size=BATCH,
     )
-    verdict, margin = _judged(known[0], shots.motion, (count, tracks))
-    speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
+    verdict, margin = _verdicts_and_margins(problem_and_bounds[0], shots.motion, (count, n_margins))
+    speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, n_margins)
     slowest = np.where(verdict == 0, speed, np.inf).argmin(1)
     largest, each, is_found = margin.argmax(1), np.arange(count), (verdict == 0).any(1)
 
     def shown(values: np.ndarray) -> np.ndarray:
-        return np.where(is_found, values.reshape(count, tracks)[each, slowest], np.nan)
+        return np.where(is_found, values.reshape(count, n_margins)[each, slowest], np.nan)
 
     x, y, z = (shown(axis) for axis in shots.position.T)
     return LaunchRange(
@@ -156,8 +161,8 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
     )
 
 
-def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    # Motions are judged together in batches of one length, whatever is asked for.
+def _verdicts_and_margins(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    # Verdicts of motions in batches of one length, whatever is asked for.
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
     judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
     verdict = np.concatenate([x.verdict for x in judgements])

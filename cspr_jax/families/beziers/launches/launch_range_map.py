@@ -1,4 +1,4 @@
-"""Maps of launches: where an object can be thrown by one Bezier segment from a place."""
+"""Maps of launches: where an object can be thrown by one Bezier segment from a position."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.beziers.launches.launch_range import launch_range
-from cspr_jax.families.beziers.launches.release_bounds import bounds_of
+from cspr_jax.families.beziers.launches.release import bounds_of
 from cspr_jax.maps.releases_map import ReleasesMap
 
 _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release_y", "release_z")
@@ -18,10 +18,10 @@ _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release
 class LaunchRangeMap(ReleasesMap):
     """The launch of least speed to each landing place; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""
-        super().__init__(robot_file, keys, file)
-        search = self._search = keys.launch or LaunchSearch()
+        super().__init__(robot_file, spec, file)
+        search = self._search = spec.launch or LaunchSearch()
         try:
             ranges = (search.release_x, search.release_y, search.release_z)
             self._bounds = bounds_of(self._problem, self._frame, ranges, search.max_duration)

@@ -1,7 +1,7 @@
 """Launches: the flight to a target, the segment on which an object is released, and the choice of what is left open.
 
-The control point and the end of that segment follow from the place and the velocity of release, (29), and the
-accelerations of the whole sequence from that control point.
+The control point and the end of that segment follow from the position and the velocity of release, (29), and the
+accelerations of all the sequence from that control point.
 """
 
 from typing import Any, NamedTuple
@@ -11,13 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.beziers.launches.through_release import through
-from cspr_jax.families.beziers.sequences import Anchored, duration_bounds, judged, margins_of, segments_of
+from cspr_jax.families.beziers.launches.release import through
+from cspr_jax.families.beziers.sequences import Anchored, duration_bounds, margins_of, segments_of, verified
 from cspr_jax.launch.flight import aimed, flown
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.constrained_minima import constrained_minimum
 
-# Parts of the duration of its segment between which a release is looked for.
+# Parts of the duration of its segment between which a release is searched for.
 EARLIEST, LATEST = 0.05, 0.95
 
 
@@ -28,7 +28,7 @@ class Launch(NamedTuple):
         points: (n + 1, 3) of the sequence, z down, m; the end of the launching segment is ignored.
         segment: () number of the launching segment.
         target: (3,) m.
-        point: (3,) place of the release, m; None: on the parabola of `velocity`.
+        point: (3,) position of the release, m; None: on the parabola of `velocity`.
         velocity: (3,) at the target, m/s; None: as `point` and the time of flight demand.
         time: () of the flight, s; None: to be chosen.
         release: () time after the start of the segment, s; None: to be chosen.
@@ -120,9 +120,9 @@ def launched(problem: Problem, launch: Launch, durations: list[float | None], ch
 
 
 def _searched(problem: Problem, launch: Launch, durations: list[float | None], parts) -> LaunchSequence:
-    known = jnp.asarray([1.0 if time is None else time for time in durations])
+    given = jnp.asarray([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None], int)
-    arguments: Any = (problem, launch, known, free)
+    arguments: Any = (problem, launch, given, free)
     shortest, longest = duration_bounds(problem, np.asarray(launch.points))
     bounds = [(shortest, longest)] * len(free)
     bounds += [(EARLIEST, LATEST)] if launch.release is None else []
@@ -130,9 +130,9 @@ def _searched(problem: Problem, launch: Launch, durations: list[float | None], p
     if not bounds:
         return _sequence_of(arguments, jnp.zeros(0))
 
-    def judge(x: np.ndarray):
+    def verify(x: np.ndarray):
         candidate = _sequence_of(arguments, jnp.asarray(x))
-        return judged(problem, segments_of(candidate.sequence, candidate.durations))
+        return verified(problem, segments_of(candidate.sequence, candidate.durations))
 
     low, high = (np.array(side) for side in zip(*bounds, strict=True))
-    return _sequence_of(arguments, jnp.asarray(constrained_minimum(parts, arguments, low, high, judge)))
+    return _sequence_of(arguments, jnp.asarray(constrained_minimum(parts, arguments, low, high, verify)))

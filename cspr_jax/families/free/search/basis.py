@@ -1,4 +1,4 @@
-"""Quintic B-splines on equal intervals of normalised time, clamped, and the instants at which motions are looked at."""
+"""Clamped quintic B-splines on equal intervals of normalised time, and the samples at which motions are evaluated."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 DEGREE = 5
 # Control points that count in one interval.
 LOCAL = DEGREE + 1
-# Weights of the first instants in an integral, over their distance.
+# Weights of the first samples in an integral, over their distance.
 GREGORY = (3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0)
 
 
@@ -24,16 +24,16 @@ class Basis(NamedTuple):
 
     Fields:
         knots: (K + 6,) of normalised time.
-        tau: (m, n) instants of normalised time, equidistant, from start to end.
-        rows: (m, n, 3, 6) values, first and second derivatives there of the functions of an interval's control points.
-        averages: (K,) instants where control points count most.
-        fit: (K, K) control points from values at these instants.
+        tau: (m, n) samples of normalised time, equidistant, from start to end.
+        functions: (m, n, 3, 6) values and two derivatives there of the functions of an interval's control points.
+        averages: (K,) Greville abscissae: times at which control points count most.
+        fit: (K, K) control points from values at these times.
         pieces: (m, 6, 6) Bernstein coefficients of each interval from its control points.
     """
 
     knots: np.ndarray
     tau: np.ndarray
-    rows: np.ndarray
+    functions: np.ndarray
     averages: np.ndarray
     fit: np.ndarray
     pieces: np.ndarray
@@ -44,48 +44,48 @@ class Basis(NamedTuple):
         return len(self.averages)
 
     @property
-    def end_slope(self) -> float:
+    def velocity_step(self) -> float:
         """Step between the first two control points, over the first derivative at the start."""
         return 1.0 / (DEGREE * len(self.tau))
 
     @property
-    def end_bend(self) -> float:
+    def acceleration_step(self) -> float:
         """Step to the third control point that a second derivative at the start needs, over that derivative."""
         return 2.0 / (DEGREE * (DEGREE - 1) * len(self.tau) ** 2)
 
     @property
-    def shares(self) -> np.ndarray:
-        """Shares of the duration for which the instants stand in an integral, (m, n): Gregory's rule of order 4."""
-        shares = np.ones(self.tau.size)
-        shares[:3], shares[-3:] = GREGORY, GREGORY[::-1]
-        return shares.reshape(self.tau.shape) / (self.tau.size - 1)
+    def weights(self) -> np.ndarray:
+        """Weights of the samples in an integral over normalised time, (m, n): Gregory's rule of order 4."""
+        values = np.ones(self.tau.size)
+        values[:3], values[-3:] = GREGORY, GREGORY[::-1]
+        return values.reshape(self.tau.shape) / (self.tau.size - 1)
 
     def in_intervals(self, controls: np.ndarray) -> Float[np.ndarray, "... m 6 d"]:
         """Control points that count in each interval."""
         return np.stack([controls[..., m : m + LOCAL, :] for m in range(len(self.tau))], axis=-3)
 
-    def places(self, controls: np.ndarray) -> Float[np.ndarray, "... m n 3 d"]:
-        """Values and two derivatives at all instants."""
-        return np.einsum("mnrk,...mkd->...mnrd", self.rows, self.in_intervals(controls), optimize=True)
+    def evaluate(self, controls: np.ndarray) -> Float[np.ndarray, "... m n 3 d"]:
+        """Values and two derivatives at all samples."""
+        return np.einsum("mnrk,...mkd->...mnrd", self.functions, self.in_intervals(controls), optimize=True)
 
 
 @lru_cache(maxsize=8)
-def basis(intervals: int, instants: int) -> Basis:
+def basis(intervals: int, samples: int) -> Basis:
     """Basis functions."""
     borders = np.linspace(0.0, 1.0, intervals + 1)
     knots = np.concatenate([np.zeros(DEGREE), borders, np.ones(DEGREE)])
     count = intervals + DEGREE
-    functions = BSpline(knots, np.eye(count), DEGREE)
-    tau = np.linspace(0.0, 1.0, intervals * instants).reshape(intervals, instants)
-    derivatives = [functions.derivative(order)(tau) for order in range(3)]
-    rows = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
+    spline = BSpline(knots, np.eye(count), DEGREE)
+    tau = np.linspace(0.0, 1.0, intervals * samples).reshape(intervals, samples)
+    derivatives = [spline.derivative(order)(tau) for order in range(3)]
+    functions = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
     averages = np.array([knots[k + 1 : k + 1 + DEGREE].mean() for k in range(count)])
-    # Bernstein coefficients from values at six places of each interval.
+    # Bernstein coefficients from values at six points of each interval.
     fraction = np.linspace(0.0, 1.0, LOCAL)[:, None]
     power = np.arange(LOCAL)
     bernstein = np.array([comb(DEGREE, k) for k in power]) * fraction**power * (1.0 - fraction) ** power[::-1]
-    values = functions(borders[:-1, None] + fraction.T / intervals)
+    values = spline(borders[:-1, None] + fraction.T / intervals)
     pieces = [np.linalg.solve(bernstein, values[m, :, m : m + LOCAL]) for m in range(intervals)]
     return Basis(
-        knots, tau, np.swapaxes(np.array(rows), 1, 2), averages, np.linalg.inv(functions(averages)), np.array(pieces)
+        knots, tau, np.swapaxes(np.array(functions), 1, 2), averages, np.linalg.inv(spline(averages)), np.array(pieces)
     )

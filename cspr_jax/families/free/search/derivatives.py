@@ -1,4 +1,4 @@
-"""Equations of a motion at many instants, and their first and second derivatives.
+"""Equations of a motion at many samples, and their first and second derivatives.
 
 Derivatives are taken by the coordinates and their derivatives in time, of which most results depend on few; those by
 the duration, and in normalised time, follow from them.
@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.families.free.search.determinants import determinant, unit_wrenches, with_derivatives
-from cspr_jax.families.free.search.instants import residual_at, state_of
+from cspr_jax.families.free.search.equations import residual_at, state_of
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
@@ -33,8 +33,8 @@ SCALARS = 2
 POWERS = np.arange(3.0)
 
 
-class InstantValues(NamedTuple):
-    """Equations of instants, whose residuals are those of the tensions and less other values, and their derivatives.
+class EquationValues(NamedTuple):
+    """Equations at samples, whose residuals are those of the tensions and less other values, and their derivatives.
 
     Derivatives are by x: the coordinates, their first and second derivatives in normalised time, the duration, and the
     level of the objective, on which the equations do not depend.
@@ -42,119 +42,121 @@ class InstantValues(NamedTuple):
     Fields:
         residual: (..., n_equations) without the other values: what tensions miss of the wrench, over the weight; then
             less the other values of the state.
-        slope: (..., n_equations, n_x).
+        jacobian: (..., n_equations, n_x).
         matrix: (..., dof, n_cables) wrenches of unit tensions.
-        second_derivative: (..., n_x, n_x) second derivatives of the residuals times multipliers.
+        hessian: (..., n_x, n_x) second derivatives of the residuals times multipliers.
         mixed: (..., n_cables, n_x) of the same, by a tension and x.
     """
 
     residual: Any
-    slope: Any
+    jacobian: Any
     matrix: Any
-    second_derivative: Any
+    hessian: Any
     mixed: Any
 
 
 @persistent_jit
-def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> Array:
-    def one(reference: Array, place: Array, duration: Array, tensions: Array) -> Array:
-        missed = residual_at(robot, limits, reference, _motion(place, duration), tensions)
+def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, samples: tuple[Array, ...]) -> Array:
+    def one(reference: Array, normalised: Array, duration: Array, tensions: Array) -> Array:
+        missed = residual_at(robot, limits, reference, _motion(normalised, duration), tensions)
         if longest is not None:
             missed = jnp.append(missed, -duration / longest)
         if not judged_poses(robot)[0]:
             return missed
-        still = jnp.zeros_like(place[0])
-        return jnp.append(missed, -determinant(robot, state_of(robot, reference, place[0], still, still)))
+        zero = jnp.zeros_like(normalised[0])
+        return jnp.append(missed, -determinant(robot, state_of(robot, reference, normalised[0], zero, zero)))
 
-    return jax.vmap(one)(*instants)
+    return jax.vmap(one)(*samples)
 
 
-def _motion(place: Array, duration: Array) -> tuple[Array, Array, Array]:
+def _motion(normalised: Array, duration: Array) -> tuple[Array, Array, Array]:
     # Coordinates and derivatives in time, from those in normalised time, (3, d).
-    return tuple(place * (duration**-POWERS)[:, None])
+    return tuple(normalised * (duration**-POWERS)[:, None])
 
 
 @persistent_jit
-def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> InstantValues:
-    def one(reference: Array, place: Array, duration: Array, tensions: Array, multipliers: Array) -> InstantValues:
+def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, samples: tuple[Array, ...]) -> EquationValues:
+    def one(
+        reference: Array, normalised: Array, duration: Array, tensions: Array, multipliers: Array
+    ) -> EquationValues:
         def missed(*motion: Array) -> Array:
             return residual_at(robot, limits, reference, motion, tensions)
 
-        def matrix(place: Array) -> Array:
-            still = jnp.zeros_like(place)
-            return unit_wrenches(robot, state_of(robot, reference, place, still, still))
+        def matrix(position: Array) -> Array:
+            zero = jnp.zeros_like(position)
+            return unit_wrenches(robot, state_of(robot, reference, position, zero, zero))
 
-        motion = _motion(place, duration)
-        residual, d = missed(*motion), place.shape[1]
-        slope = jnp.concatenate([jax.jacfwd(missed, k)(*motion) for k in range(3)], axis=1)
-        pushes, by_matrix = multipliers[: len(residual)], jnp.zeros((robot.dof, robot.n_cables))
+        motion = _motion(normalised, duration)
+        residual, d = missed(*motion), normalised.shape[1]
+        jacobian = jnp.concatenate([jax.jacfwd(missed, k)(*motion) for k in range(3)], axis=1)
+        duals, by_matrix = multipliers[: len(residual)], jnp.zeros((robot.dof, robot.n_cables))
         regular = with_derivatives(matrix, motion[0]) if judged_poses(robot)[0] else None
         if regular is not None:
             by_matrix = -multipliers[-1] * regular.cofactors
 
-        def pushed(*motion: Array) -> Array:
-            return jnp.dot(missed(*motion), pushes) + jnp.sum(by_matrix * matrix(motion[0]))
+        def lagrangian(*motion: Array) -> Array:
+            return jnp.dot(missed(*motion), duals) + jnp.sum(by_matrix * matrix(motion[0]))
 
-        second_derivative = _bend(pushed, motion)
-        mixed = jax.jacfwd(lambda place: multipliers[: robot.dof] @ matrix(place))(motion[0])
+        hessian = _hessian(lagrangian, motion)
+        mixed = jax.jacfwd(lambda position: multipliers[: robot.dof] @ matrix(position))(motion[0])
         if longest is not None:
-            residual, slope = jnp.append(residual, -duration / longest), jnp.pad(slope, [(0, 1), (0, 0)])
+            residual, jacobian = jnp.append(residual, -duration / longest), jnp.pad(jacobian, [(0, 1), (0, 0)])
         if regular is not None:
             residual = jnp.append(residual, -regular.value)
-            slope = jnp.concatenate([slope, jnp.pad(-regular.slope, (0, 2 * d))[None]])
-            second_derivative = second_derivative.at[:d, :d].add(-multipliers[-1] * regular.second_derivative)
-        slope, second_derivative = _chained(motion, duration, slope, second_derivative, multipliers)
+            jacobian = jnp.concatenate([jacobian, jnp.pad(-regular.gradient, (0, 2 * d))[None]])
+            hessian = hessian.at[:d, :d].add(-multipliers[-1] * regular.hessian)
+        jacobian, hessian = _chained(motion, duration, jacobian, hessian, multipliers)
         if longest is not None:
-            slope = slope.at[len(pushes), -SCALARS].set(-1.0 / longest)
-        return InstantValues(
-            residual, slope, matrix(motion[0]), second_derivative, jnp.pad(mixed, [(0, 0), (0, 2 * d + SCALARS)])
+            jacobian = jacobian.at[len(duals), -SCALARS].set(-1.0 / longest)
+        return EquationValues(
+            residual, jacobian, matrix(motion[0]), hessian, jnp.pad(mixed, [(0, 0), (0, 2 * d + SCALARS)])
         )
 
-    return jax.vmap(one)(*instants)
+    return jax.vmap(one)(*samples)
 
 
-def _bend(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
+def _hessian(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
     # Second derivatives by all of a motion, (3 d, 3 d): the further one differentiates, the fewer arguments are left.
     parts: list[tuple[Array, ...]] = [jax.jacfwd(jax.grad(function, range(k, 3)), k)(*motion) for k in range(3)]
     return jnp.block([[parts[k][i - k] if k <= i else parts[i][k - i].T for k in range(3)] for i in range(3)])
 
 
 def _chained(
-    motion: Sequence[Array], duration: Array, slope: Array, second_derivative: Array, multipliers: Array
+    motion: Sequence[Array], duration: Array, jacobian: Array, hessian: Array, multipliers: Array
 ) -> tuple[Array, Array]:
     # Derivatives by coordinates in normalised time, by the duration and by the level, from those by the motion in time.
     d, flat = len(motion[0]), jnp.concatenate(motion)
     power = np.repeat(POWERS, d)
     scale, along = duration**-power, -power * flat / duration
-    push = multipliers @ slope
-    side = scale * (second_derivative @ along - power * push / duration)
-    corner = along @ second_derivative @ along + jnp.dot(push, power * (power + 1.0) * flat) / duration**2
-    full: list[list[Any]] = [
-        [second_derivative * jnp.outer(scale, scale), side[:, None]],
+    gradient = multipliers @ jacobian
+    side = scale * (hessian @ along - power * gradient / duration)
+    corner = along @ hessian @ along + jnp.dot(gradient, power * (power + 1.0) * flat) / duration**2
+    blocks: list[list[Any]] = [
+        [hessian * jnp.outer(scale, scale), side[:, None]],
         [side[None], corner[None, None]],
     ]
-    slopes = jnp.concatenate([slope * scale[None], (slope @ along)[:, None]], axis=1)
-    return jnp.pad(slopes, [(0, 0), (0, 1)]), jnp.pad(jnp.block(full), (0, 1))
+    chained = jnp.concatenate([jacobian * scale[None], (jacobian @ along)[:, None]], axis=1)
+    return jnp.pad(chained, [(0, 0), (0, 1)]), jnp.pad(jnp.block(blocks), (0, 1))
 
 
-def instant_values(
-    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *instants: np.ndarray
-) -> InstantValues:
-    """Equations at many instants."""
-    return InstantValues(*_at_all(partial(_kernel, robot, limits, longest), instants))
+def equation_values(
+    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *samples: np.ndarray
+) -> EquationValues:
+    """Equations at many samples."""
+    return EquationValues(*_at_all(partial(_kernel, robot, limits, longest), samples))
 
 
 def residuals(
-    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *instants: np.ndarray
+    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *samples: np.ndarray
 ) -> Float[np.ndarray, "... n_equations"]:
-    """Residuals of the equations at many instants, for trials of steps, which need no derivatives."""
-    return _at_all(lambda part: (_residual_kernel(robot, limits, longest, part),), instants)[0]
+    """Residuals of the equations at many samples, for trials of steps, which need no derivatives."""
+    return _at_all(lambda part: (_residual_kernel(robot, limits, longest, part),), samples)[0]
 
 
 def _at_all(
-    kernel: Callable[[tuple[Array, ...]], Sequence[Array]], instants: tuple[np.ndarray, ...]
+    kernel: Callable[[tuple[Array, ...]], Sequence[Array]], samples: tuple[np.ndarray, ...]
 ) -> list[np.ndarray]:
     # Results of a kernel, leaves (..., ...).
-    shape = instants[2].shape
-    flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in instants)
-    return [leaf.reshape(*shape, *leaf.shape[1:]) for leaf in in_batches(kernel, flat, batch_size=BATCH)]
+    shape = samples[2].shape
+    flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in samples)
+    return [values.reshape(*shape, *values.shape[1:]) for values in in_batches(kernel, flat, batch_size=BATCH)]

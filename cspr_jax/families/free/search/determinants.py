@@ -23,9 +23,9 @@ from cspr_jax.robots.model.state import State
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Rows of a minor; of forces and moments of a platform in space.
-ROWS = 3
-FORCES, MOMENTS = slice(0, ROWS), slice(ROWS, 2 * ROWS)
+# Rows of a minor; those of forces and of moments of a platform in space.
+MINOR = 3
+FORCES, MOMENTS = slice(0, MINOR), slice(MINOR, 2 * MINOR)
 
 
 class Determinant(NamedTuple):
@@ -33,65 +33,65 @@ class Determinant(NamedTuple):
 
     Fields:
         value: ().
-        slope: (d,).
-        second_derivative: (d, d) without second derivatives of the matrix.
+        gradient: (d,).
+        hessian: (d, d) without second derivatives of the matrix.
         cofactors: (n, n) by which second derivatives of the matrix count in those of the determinant.
     """
 
     value: Array
-    slope: Array
-    second_derivative: Array
+    gradient: Array
+    hessian: Array
     cofactors: Array
 
 
 def unit_wrenches(robot: AnyRobot, state: State) -> Float[Array, "dof n_cables"]:
-    """Wrenches of unit tensions, moments over the size of the platform."""
+    """Wrenches of unit tensions, moments over the radius of the platform."""
     return robot.wrench_matrix(state) / wrench_units(robot)[:, None]
 
 
 def determinant(robot: AnyRobot, state: State) -> Float[Array, ""]:
     """Determinant of the wrenches of unit tensions."""
     matrix = unit_wrenches(robot, state)
-    if len(matrix) == ROWS:
+    if len(matrix) == MINOR:
         return _minors(matrix)[0]
     signs, others = _laplace(len(matrix))
     return jnp.dot(signs * _minors(matrix[FORCES]), _minors(matrix[MOMENTS])[others])
 
 
-def with_derivatives(matrix: Callable[[Array], Array], place: Float[Array, "d"]) -> Determinant:
+def with_derivatives(matrix: Callable[[Array], Array], point: Float[Array, "d"]) -> Determinant:
     """Determinant of a matrix, with derivatives."""
-    rows, slopes = matrix(place), jax.jacfwd(matrix)(place)
-    if len(rows) == ROWS:
-        value, (cofactors, second_derivative) = _minors(rows)[0], _weighted(jnp.ones(1), rows, slopes)
+    values, derivatives = matrix(point), jax.jacfwd(matrix)(point)
+    if len(values) == MINOR:
+        value, (cofactors, hessian) = _minors(values)[0], _weighted(jnp.ones(1), values, derivatives)
     else:
         # Laplace's expansion, with minors of the moments as constant weights of those of the forces, and the reverse.
         (forces, by_forces), (moments, by_moments) = (
-            (_minors(rows[part]), jax.jacfwd(lambda place, part=part: _minors(matrix(place)[part]))(place))
+            (_minors(values[part]), jax.jacfwd(lambda point, part=part: _minors(matrix(point)[part]))(point))
             for part in (FORCES, MOMENTS)
         )
-        signs, others = _laplace(len(rows))
+        signs, others = _laplace(len(values))
         of_forces, of_moments = signs * moments[others], (signs * forces)[others]
-        upper, second_derivative = _weighted(of_forces, rows[FORCES], slopes[FORCES])
-        lower, further = _weighted(of_moments, rows[MOMENTS], slopes[MOMENTS])
+        upper, hessian = _weighted(of_forces, values[FORCES], derivatives[FORCES])
+        lower, further = _weighted(of_moments, values[MOMENTS], derivatives[MOMENTS])
         both = by_forces.T @ (signs[:, None] * by_moments[others])
-        value, cofactors, second_derivative = (
+        value, cofactors, hessian = (
             jnp.dot(forces, of_forces),
             jnp.concatenate([upper, lower]),
-            second_derivative + further + both + both.T,
+            hessian + further + both + both.T,
         )
-    return Determinant(value, jnp.einsum("ak,akd->d", cofactors, slopes), second_derivative, cofactors)
+    return Determinant(value, jnp.einsum("ak,akd->d", cofactors, derivatives), hessian, cofactors)
 
 
 def _minors(rows: Array) -> Array:
     # Determinants of three rows for each choice of three columns, in the order of `combinations`. Numbers, since
     # gathers of columns take much longer.
     columns = range(rows.shape[1])
-    a, b, c = ([rows[i, j] for j in columns] for i in range(ROWS))
+    a, b, c = ([rows[i, j] for j in columns] for i in range(MINOR))
     pairs = {(i, j): a[i] * b[j] - a[j] * b[i] for i, j in itertools.combinations(columns, 2)}
     return jnp.stack(
         [
             pairs[i, j] * c[k] - pairs[i, k] * c[j] + pairs[j, k] * c[i]
-            for i, j, k in itertools.combinations(columns, ROWS)
+            for i, j, k in itertools.combinations(columns, MINOR)
         ]
     )
 
@@ -99,7 +99,7 @@ def _minors(rows: Array) -> Array:
 def _weighted(weights: Array, rows: Array, slopes: Array) -> tuple[Array, Array]:
     # Derivatives of a sum of minors times weights by the rows, (3, n), and second ones by coordinates, (d, d), from the
     # first ones of the rows, (3, n, d).
-    alternating, across = _alternating(rows.shape[1]), _alternating(ROWS)[0]
+    alternating, across = _alternating(rows.shape[1]), _alternating(MINOR)[0]
     products = jnp.einsum("klm,cm->klc", jnp.tensordot(weights, alternating, 1), rows)
     matrices = jnp.einsum("klc,abc->klab", products, across)
     cofactors = 0.5 * jnp.einsum("klab,bl->ak", matrices, rows)
@@ -109,10 +109,10 @@ def _weighted(weights: Array, rows: Array, slopes: Array) -> tuple[Array, Array]
 @cache
 def _alternating(count: int) -> np.ndarray:
     # Signs of permutations of the columns of each minor, (minors, n, n, n).
-    sets = list(itertools.combinations(range(count), ROWS))
+    sets = list(itertools.combinations(range(count), MINOR))
     signs = np.zeros((len(sets), count, count, count))
     for number, columns in enumerate(sets):
-        for first, second, third in itertools.permutations(range(ROWS)):
+        for first, second, third in itertools.permutations(range(MINOR)):
             sign = np.sign((second - first) * (third - first) * (third - second))
             signs[number, columns[first], columns[second], columns[third]] = sign
     return signs
@@ -121,7 +121,7 @@ def _alternating(count: int) -> np.ndarray:
 @cache
 def _laplace(count: int) -> tuple[Any, np.ndarray]:
     # Signs of the minors of the first three rows in Laplace's expansion; numbers of the minors that belong to them.
-    sets = list(itertools.combinations(range(count), ROWS))
+    sets = list(itertools.combinations(range(count), MINOR))
     rest = [tuple(column for column in range(count) if column not in columns) for columns in sets]
-    signs = np.array([(-1.0) ** (sum(columns) - ROWS) for columns in sets])
+    signs = np.array([(-1.0) ** (sum(columns) - MINOR) for columns in sets])
     return signs, np.array([sets.index(columns) for columns in rest])

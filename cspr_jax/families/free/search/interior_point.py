@@ -1,8 +1,8 @@
 """Search for the best motions: a primal-dual interior-point method for many motions at once.
 
 Bounds are kept by barriers. Equations may be missed at a price, whose multipliers are those of the last optimum
-(an augmented Lagrangian), so that every start has a way down to a motion that meets them; barriers and what may be
-missed fall together. Steps are Newton's, no longer than the merit falls.
+(an augmented Lagrangian), so that from every start the search can descend to a motion that meets them; barriers and
+what may be missed fall together. Steps are Newton's, no longer than the merit falls.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cspr_jax.families.free.search.condensation import Softness, times, transposed
-from cspr_jax.families.free.search.descent import descended
 from cspr_jax.families.free.search.newton import newton_step
-from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints
+from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints, descended
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 
 if TYPE_CHECKING:
@@ -32,8 +31,8 @@ CLOSE, MISSED = 10.0, 1e-6
 STEPS, PATIENCE = 250, 80
 # Part of the range by which values are inside their bounds at the start, at least, and at most.
 INSIDE, AWAY = 0.1, 1e-2
-# By how much multipliers of bounds and barriers over gaps may differ.
-APART = 1e10
+# Largest ratio of multipliers of bounds and barriers over gaps, and of the latter and the former.
+MAX_RATIO = 1e10
 
 
 class OutOfTime(Exception):
@@ -55,10 +54,8 @@ class Ending(NamedTuple):
 
     def is_over(self, is_optimal: Float[np.ndarray, "l"]) -> bool:
         """Tell whether searches end now."""
-        instant = time.monotonic()
-        return instant > self.until or (
-            instant > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
-        )
+        now = time.monotonic()
+        return now > self.until or (now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all()))
 
 
 NEVER = Ending()
@@ -82,23 +79,23 @@ class Optima(NamedTuple):
 
 def _sharpened(points: SearchPoints, levels: Levels) -> tuple[Levels, np.ndarray]:
     # Weights and softness, smaller where their optimum is reached; errors.
-    barrier, (size, metric, level) = levels
+    barrier, (softness, metric, level) = levels
     while True:
-        levels = Levels(barrier, Softness(size, metric, level))
+        levels = Levels(barrier, Softness(softness, metric, level))
         errors = points.errors(levels)
         is_close = errors < CLOSE * barrier
         level = np.where(_wide(is_close, level), points.unknowns.multipliers, level)
-        size = np.where(is_close, np.maximum(SOFTNESS[1], SOFTNESS_FALL * size), size)
+        softness = np.where(is_close, np.maximum(SOFTNESS[1], SOFTNESS_FALL * softness), softness)
         metric = np.where(_wide(is_close, metric), points.metric(), metric)
         is_close &= barrier > BARRIERS[1]
         if not is_close.any():
-            return Levels(barrier, Softness(size, metric, level)), errors
+            return Levels(barrier, Softness(softness, metric, level)), errors
         smaller = np.minimum(BARRIER_FALL * barrier, barrier**BARRIER_POWER)
         barrier = np.where(is_close, np.maximum(BARRIERS[1], smaller), barrier)
 
 
-def _wide(flags: np.ndarray, leaf: np.ndarray) -> np.ndarray:
-    return flags.reshape(-1, *[1] * (leaf.ndim - 1))
+def _wide(flags: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return flags.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def optima(
@@ -113,7 +110,7 @@ def optima(
     """Search for the best motions."""
     count, points = len(start.duration), SearchPoints.of(tasks, start)
     soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
-    result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
+    result = Optima(Unknowns(*(values.copy() for values in start)), np.zeros(count, bool), np.zeros(count, int))
     try:
         is_stopped = not _sought(points, Levels(np.full(count, barrier), soft), result, ending)
     except KeyboardInterrupt:
@@ -127,8 +124,8 @@ def optima(
 
 def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
     # Puts motions into the result as their searches end; whether all have ended in time.
-    rows = np.arange(len(result.steps))
-    regularization, waited = np.zeros(len(rows)), np.zeros(len(rows))
+    indices = np.arange(len(result.steps))
+    regularization, waited = np.zeros(len(indices)), np.zeros(len(indices))
     for number in range(STEPS + 1):
         before = levels.barrier
         levels, errors = _sharpened(points, levels)
@@ -136,14 +133,14 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
         is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
         is_late = ending.is_over(result.is_optimal)
         is_over = is_optimal | (number == STEPS) | (waited > PATIENCE) | is_late
-        for leaf, values in zip(result.unknowns, points.unknowns.taken(is_over), strict=True):
-            leaf[rows[is_over]] = values
-        result.is_optimal[rows[is_over]], result.steps[rows[is_over]] = is_optimal[is_over], number
+        for found, values in zip(result.unknowns, points.unknowns.take(is_over), strict=True):
+            found[indices[is_over]] = values
+        result.is_optimal[indices[is_over]], result.steps[indices[is_over]] = is_optimal[is_over], number
         if is_over.all():
             return not is_late
         if is_over.any():
-            rows, regularization, waited = rows[~is_over], regularization[~is_over], waited[~is_over]
-            points, levels = points.taken(~is_over), levels.taken(~is_over)
+            indices, regularization, waited = indices[~is_over], regularization[~is_over], waited[~is_over]
+            points, levels = points.take(~is_over), levels.take(~is_over)
         step = newton_step(
             points.tasks,
             points.unknowns,
@@ -160,23 +157,29 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
 
 def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
     # Multipliers of bounds not too far from barriers over gaps.
-    unknowns, pushes = points.unknowns, []
-    for push, gap in zip((unknowns.low_push, unknowns.high_push), points.tasks.gaps(unknowns), strict=True):
+    unknowns, multipliers = points.unknowns, []
+    for multiplier, gap in zip(
+        (unknowns.low_multipliers, unknowns.high_multipliers), points.tasks.gaps(unknowns), strict=True
+    ):
         near = wide(barrier) / gap
-        pushes.append(np.where(np.isfinite(gap), np.clip(push, near / APART, near * APART), 0.0))
-    return dataclasses.replace(points, unknowns=unknowns._replace(low_push=pushes[0], high_push=pushes[1]))
+        multipliers.append(np.where(np.isfinite(gap), np.clip(multiplier, near / MAX_RATIO, near * MAX_RATIO), 0.0))
+    return dataclasses.replace(
+        points, unknowns=unknowns._replace(low_multipliers=multipliers[0], high_multipliers=multipliers[1])
+    )
 
 
 def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
     """Unknowns of motions found before, from which a search within other bounds begins."""
     low, high = tasks.bounds(unknowns.level)
     inside = np.minimum(np.sqrt(barrier), INSIDE * (high - low))
-    return _pushed(tasks, unknowns._replace(values=np.clip(unknowns.values, low + inside, high - inside)), barrier)
+    return _with_multipliers(
+        tasks, unknowns._replace(values=np.clip(unknowns.values, low + inside, high - inside)), barrier
+    )
 
 
-def _pushed(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
+def _with_multipliers(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
     low, high = (np.where(np.isfinite(gap), barrier / gap, 0.0) for gap in tasks.gaps(unknowns))
-    return unknowns._replace(low_push=low, high_push=high)
+    return unknowns._replace(low_multipliers=low, high_multipliers=high)
 
 
 def started(
@@ -186,9 +189,9 @@ def started(
     count, cables, dof = duration.shape[1], tasks.robot.n_cables, tasks.robot.dof
     acceleration = tasks.accelerations.copy()
     for side, index, sign in ((0, OUTER - 1, 3.0), (1, -OUTER, -3.0)):
-        step = controls[:, :, index] - tasks.places[:, :, side]
-        step = step - sign * tasks.basis.end_slope * duration[..., None] * tasks.velocities[:, :, side]
-        second = step / (tasks.basis.end_bend * duration[..., None] ** 2)
+        step = controls[:, :, index] - tasks.ends[:, :, side]
+        step = step - sign * tasks.basis.velocity_step * duration[..., None] * tasks.velocities[:, :, side]
+        second = step / (tasks.basis.acceleration_step * duration[..., None] ** 2)
         near = np.linalg.solve(tasks.turns[:, :, side], second[..., None])[..., 0]
         is_free = tasks.is_free[:, side : count + side, None]
         acceleration[:, side : count + side] = np.where(is_free, near, acceleration[:, side : count + side])
@@ -206,4 +209,4 @@ def started(
     tensions = middle + times(transposed(matrix), np.linalg.solve(metric, lacking[..., None])[..., 0])
     values = np.concatenate([tensions, -residual[..., dof:]], axis=-1)
     inside = np.minimum(AWAY, INSIDE * (high - low))
-    return _pushed(tasks, unknowns._replace(values=np.clip(values, low + inside, high - inside)), barrier)
+    return _with_multipliers(tasks, unknowns._replace(values=np.clip(values, low + inside, high - inside)), barrier)

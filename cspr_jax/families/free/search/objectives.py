@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.families.free.search.instants import ValueBounds
+from cspr_jax.families.free.search.equations import ValueBounds
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Share of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
+# Weight of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
 LITTLE = 1e-4
 
 
@@ -24,9 +24,9 @@ class Objective(NamedTuple):
     """An objective, as a search has it.
 
     Fields:
-        time: share of the durations, over half a swing.
-        energy: share of the integral of the squares of the tensions over the weight, in half swings.
-        level: share of the level; 0 without one.
+        time: weight of the durations, over half a swing.
+        energy: weight of the integral of the squares of the tensions over the weight, in half swings.
+        level: weight of the level; 0 without one.
         low_lift: (n_values,) by how much lower bounds rise with the level.
         high_lift: (n_values,) by how much upper bounds do.
         start: level from which a search begins.
@@ -47,17 +47,17 @@ class Objective(NamedTuple):
 
 
 def _time(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
-    still = np.zeros(len(bounds.low))
-    return Objective(1.0, 0.0, 0.0, still, still), bounds
+    zero = np.zeros(len(bounds.low))
+    return Objective(1.0, 0.0, 0.0, zero, zero), bounds
 
 
 def _energy(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
-    still = np.zeros(len(bounds.low))
-    return Objective(0.0, 1.0, 0.0, still, still), bounds
+    zero = np.zeros(len(bounds.low))
+    return Objective(0.0, 1.0, 0.0, zero, zero), bounds
 
 
 def _tension(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
-    # The level is the largest tension as a share of the one that is allowed.
+    # The level is the largest tension over the one that is allowed.
     high, lift = bounds.high.copy(), np.zeros(len(bounds.low))
     high[:n_cables], lift[:n_cables] = 0.0, bounds.high[:n_cables]
     return Objective(LITTLE, 0.0, 1.0, np.zeros(len(lift)), lift, 1.0, 1.0), bounds._replace(high=high)

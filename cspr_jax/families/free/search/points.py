@@ -1,4 +1,4 @@
-"""Motions with their equations at all instants, during a search, and how far they are from an optimum."""
+"""Motions with their equations at all samples, during a search, and steps along which their merit falls."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.families.free.search.condensation import Softness, times, transposed
-from cspr_jax.families.free.search.derivatives import SCALARS, InstantValues
-from cspr_jax.families.free.search.newton import gathered
+from cspr_jax.families.free.search.condensation import Softness, repaired_values, times, transposed
+from cspr_jax.families.free.search.derivatives import SCALARS, EquationValues
+from cspr_jax.families.free.search.newton import Step, assembled_gradient
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 
 if TYPE_CHECKING:
     from jaxtyping import Float
+
 
 # Multipliers of equations beyond which their mean counts as the unit of errors; keeps the metric of the tensions
 # regular.
@@ -26,9 +27,9 @@ class Levels(NamedTuple):
     barrier: np.ndarray
     soft: Softness
 
-    def taken(self, rows: np.ndarray) -> "Levels":
+    def take(self, indices: np.ndarray) -> "Levels":
         """Levels of some of the motions."""
-        return Levels(self.barrier[rows], Softness(*(leaf[rows] for leaf in self.soft)))
+        return Levels(self.barrier[indices], Softness(*(values[indices] for values in self.soft)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,18 +43,18 @@ class SearchPoints:
 
     tasks: Tasks
     unknowns: Unknowns
-    equations: InstantValues
+    equations: EquationValues
     residual: np.ndarray
 
     @classmethod
     def of(cls, tasks: Tasks, unknowns: Unknowns) -> "SearchPoints":
-        """Look at motions."""
+        """Evaluate motions."""
         return cls(tasks, unknowns, *tasks.equations(unknowns))
 
-    def taken(self, rows: np.ndarray) -> "SearchPoints":
+    def take(self, indices: np.ndarray) -> "SearchPoints":
         """Some of the motions."""
-        equations = InstantValues(*(leaf[rows] for leaf in self.equations))
-        return SearchPoints(self.tasks.taken(rows), self.unknowns.taken(rows), equations, self.residual[rows])
+        equations = EquationValues(*(values[indices] for values in self.equations))
+        return SearchPoints(self.tasks.take(indices), self.unknowns.take(indices), equations, self.residual[indices])
 
     def metric(self) -> Float[np.ndarray, "l s m n dof dof"]:
         """Metric of the residual of tensions' equations: a force counts as the tensions that it would take."""
@@ -67,29 +68,112 @@ class SearchPoints:
     def errors(self, levels: Levels) -> Float[np.ndarray, "l"]:
         """Largest errors of Newton's equations."""
         tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
-        count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1], tasks.robot.n_cables
-        slope = gathered(tasks.basis, times(transposed(self.equations.slope), unknowns.multipliers))
-        tensions, shares = unknowns.values[..., :cables], tasks.energy_shares
-        slope[..., -2] += tasks.objective.time / tasks.scale[:, None] + np.sum(shares * tensions**2, axis=(2, 3, 4))
-        along = times(transposed(tasks.border_slopes(unknowns)), slope[..., tasks.border])
+        count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.ends.shape[-1], tasks.robot.n_cables
+        gradient = assembled_gradient(tasks.basis, times(transposed(self.equations.jacobian), unknowns.multipliers))
+        tensions, weights = unknowns.values[..., :cables], tasks.energy_weights
+        gradient[..., -2] += tasks.objective.time / tasks.scale[:, None] + np.sum(weights * tensions**2, axis=(2, 3, 4))
+        along = times(transposed(tasks.border_jacobians(unknowns)), gradient[..., tasks.border])
         segments, accelerations = unknowns.duration.shape[1], np.zeros_like(unknowns.acceleration)
         for side in (0, 1):
             accelerations[:, side : segments + side] += along[..., 1 + side * d : 1 + (1 + side) * d]
         balance = times(transposed(self.equations.matrix), unknowns.multipliers[..., :dof])
         values = np.concatenate([balance, unknowns.multipliers[..., dof:]], axis=-1)
-        values = values - unknowns.low_push + unknowns.high_push
-        values[..., :cables] += 2.0 * shares * wide(unknowns.duration) * tensions
-        parts = [slope[..., OUTER * d : -SCALARS - OUTER * d], slope[..., -2] + along[..., 0], values]
+        values = values - unknowns.low_multipliers + unknowns.high_multipliers
+        values[..., :cables] += 2.0 * weights * wide(unknowns.duration) * tensions
+        parts = [gradient[..., OUTER * d : -SCALARS - OUTER * d], gradient[..., -2] + along[..., 0], values]
         parts.append(np.where(tasks.is_free[..., None], accelerations, 0.0))
-        pushes = unknowns.low_push, unknowns.high_push
+        multipliers = unknowns.low_multipliers, unknowns.high_multipliers
         if tasks.objective.level > 0.0:
             lifts = tasks.objective.low_lift, -tasks.objective.high_lift
-            by_level = sum(push * lift for push, lift in zip(pushes, lifts, strict=True))
+            by_level = sum(multiplier * lift for multiplier, lift in zip(multipliers, lifts, strict=True))
             parts.append(tasks.objective.level + by_level.sum((2, 3, 4)))
-        for push, gap in zip(pushes, tasks.gaps(unknowns), strict=True):
+        for multiplier, gap in zip(multipliers, tasks.gaps(unknowns), strict=True):
             is_bound = np.isfinite(gap)
-            parts.append(np.where(is_bound, np.where(is_bound, gap, 0.0) * push - wide(levels.barrier), 0.0))
-        unit = np.maximum(LARGE, (pushes[0] + pushes[1]).reshape(count, -1).mean(1)) / LARGE
+            parts.append(np.where(is_bound, np.where(is_bound, gap, 0.0) * multiplier - wide(levels.barrier), 0.0))
+        unit = np.maximum(LARGE, (multipliers[0] + multipliers[1]).reshape(count, -1).mean(1)) / LARGE
         largest = np.max([np.abs(part).reshape(count, -1).max(1, initial=0.0) for part in parts], axis=0)
         price = self.residual - soft.missed(unknowns.multipliers - soft.level)
         return np.maximum(largest / unit, np.abs(price).reshape(count, -1).max(1))
+
+
+# Halvings of a step; part of the distance to a bound that one goes, and that a correction goes; part of its derivative
+# by which the merit falls at least.
+HALVINGS, FRACTION, CORRECTED, DESCENT = 8, 0.99, 0.9, 1e-4
+
+
+def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
+    lengths = [primal] * 6 + [dual] * 2
+    return Unknowns(
+        *(
+            values + length.reshape(-1, *[1] * (values.ndim - 1)) * step
+            for values, length, step in zip(unknowns, lengths, change, strict=True)
+        )
+    )
+
+
+def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    # Longest steps, up to 1, by which no value loses more than a fraction of itself, (l,).
+    lengths = np.ones(len(pairs[0][0]))
+    for value, change in pairs:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            longest = np.where(change < 0.0, -FRACTION * value / change, np.inf)
+        lengths = np.minimum(lengths, longest.reshape(len(lengths), -1).min(1))
+    return lengths
+
+
+def _lengths(points: SearchPoints, step: Step) -> tuple[np.ndarray, np.ndarray]:
+    # Longest steps of the unknowns, and of the multipliers of bounds.
+    tasks, unknowns, change = points.tasks, points.unknowns, step.change
+    gaps = zip(tasks.gaps(unknowns), tasks.gap_changes(change), strict=True)
+    duals = (unknowns.low_multipliers, change.low_multipliers), (unknowns.high_multipliers, change.high_multipliers)
+    return _length(*gaps, (0.5 * unknowns.duration, change.duration)), _length(*duals)
+
+
+def _merit(tasks: Tasks, unknowns: Unknowns, residual: np.ndarray, levels: Levels) -> np.ndarray:
+    soft, barrier = levels.soft, np.zeros(unknowns.values.shape)
+    for gap in tasks.gaps(unknowns):
+        barrier -= np.log(np.where(np.isfinite(gap), gap, 1.0))
+    price = (soft.level + 0.5 * soft.paid(residual)) * residual
+    each = price, wide(levels.barrier) * barrier
+    return tasks.cost(unknowns) + sum(part.reshape(len(part), -1).sum(1) for part in each)
+
+
+def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
+    """Go a step, halved until the merit falls.
+
+    A trial from which it does not fall is tried once more with values that make up for the curvature of the equations
+    (a second-order correction): for platforms, whose wrenches change with every turn, steps are too short without.
+    """
+    primal, dual = _lengths(points, step)
+    before = _merit(points.tasks, points.unknowns, points.residual, levels)
+    indices, corrections = np.arange(len(primal)), np.zeros_like(points.unknowns.values)
+    for _ in range(HALVINGS):
+        part, change = points.take(indices), step.take(indices)
+        trial = _moved(part.unknowns, change.change, primal[indices], dual[indices])
+        residual, level = part.tasks.residual(trial), levels.take(indices)
+        minimum = (
+            before[indices] + DESCENT * primal[indices] * change.merit_derivative + 1e-12 * np.abs(before[indices])
+        )
+        # Not above: a merit that is no number does not fall.
+        is_over = ~(_merit(part.tasks, trial, residual, level) <= minimum)
+        if not is_over.any():
+            break
+        indices, part, change, level = indices[is_over], part.take(is_over), change.take(is_over), level.take(is_over)
+        trial, missed = trial.take(is_over), residual[is_over] - part.residual - wide(primal[indices]) * change.missed
+        correction = _correction(part, trial, change, missed, level)
+        trial = trial._replace(values=trial.values + correction)
+        falls = _merit(part.tasks, trial, part.tasks.residual(trial), level) <= minimum[is_over]
+        corrections[indices[falls]] = correction[falls]
+        indices = indices[~falls]
+        if not len(indices):
+            break
+        primal[indices] *= 0.5
+    unknowns = _moved(points.unknowns, step.change, primal, dual)
+    return SearchPoints.of(points.tasks, unknowns._replace(values=unknowns.values + corrections))
+
+
+def _correction(points: SearchPoints, trial: Unknowns, step: Step, missed: np.ndarray, levels: Levels) -> np.ndarray:
+    # Changes of the values of a trial, inside their bounds, for what equations miss beyond the step's own prediction.
+    change = repaired_values(points.equations.matrix, step.weights, missed, levels.soft)
+    low, high = (np.where(np.isfinite(gap), CORRECTED * gap, np.inf) for gap in points.tasks.gaps(trial))
+    return np.clip(change, -low, high)

@@ -1,4 +1,4 @@
-"""Motions from which searches begin: lines, lines bent to all sides, and swings about P0."""
+"""Motions from which searches begin: lines, lines deflected to all sides, and swings about P0."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.families.free.search.instants import coordinates
+from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.robots.model.point_mass import rest_point, spool_radius
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Largest number of arcs of swings; by how much of their length lines are bent.
-ARCS, BENT = 3, 0.35
+# Largest number of arcs of swings; by how much of their length lines are deflected.
+ARCS, DEFLECTION = 3, 0.35
 # Durations of lines over those of motions with the acceleration of gravity.
 SLOWER = 1.3
 
@@ -40,22 +40,22 @@ def joined_starts(parts: Sequence[Starts]) -> Starts:
     return Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def starts(tasks: Tasks, z0: float, most: int | None = None) -> Starts:
+def starts(tasks: Tasks, z0: float, max_count: int | None = None) -> Starts:
     """Starts of searches, in the same order for each task."""
     begun = list[_Start]()
-    for start, end in tasks.places[:, 0]:
+    for start, end in tasks.ends[:, 0]:
         lines = _lines(tasks, start, end)
-        swings = _swings(tasks, start, end, z0, ARCS if most is None else max(1, most - len(lines)))
+        swings = _swings(tasks, start, end, z0, ARCS if max_count is None else max(1, max_count - len(lines)))
         # Few starts are of both kinds.
-        begun += [one for pair in zip_longest(lines, swings) for one in pair if one is not None][:most]
-    task = np.repeat(np.arange(len(tasks.places)), len(begun) // len(tasks.places))
-    controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array([one.places for one in begun]))
+        begun += [one for pair in zip_longest(lines, swings) for one in pair if one is not None][:max_count]
+    task = np.repeat(np.arange(len(tasks.ends)), len(begun) // len(tasks.ends))
+    controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array([one.samples for one in begun]))
     return Starts(task, controls[:, None], np.array([[one.duration] for one in begun]))
 
 
 class _Start(NamedTuple):
-    # Places (K, d) at the instants where control points count most, and the duration, s.
-    places: np.ndarray
+    # Coordinates (K, d) at the times where control points count most, and the duration, s.
+    samples: np.ndarray
     duration: float
 
 
@@ -66,37 +66,40 @@ def _line(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
-    # The line, and lines that are bent to all sides.
+    # The line, and lines that are deflected to all sides.
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
-    gravity, size = float(tasks.robot.gravity), float(spool_radius(tasks.robot))
-    length = float(np.linalg.norm((end - start)[: len(along)])) + size * float(
+    gravity, radius = float(tasks.robot.gravity), float(spool_radius(tasks.robot))
+    length = float(np.linalg.norm((end - start)[: len(along)])) + radius * float(
         np.linalg.norm((end - start)[len(along) :])
     )
-    line, duration = _line(tasks, start, end), SLOWER * 2.0 * np.sqrt(2.0 * max(length, 0.1 * size) / gravity)
-    return [_Start(line + BENT * length * bulge(tau) * way, duration) for way in ways(end - start, along)]
+    line, duration = _line(tasks, start, end), SLOWER * 2.0 * np.sqrt(2.0 * max(length, 0.1 * radius) / gravity)
+    return [
+        _Start(line + DEFLECTION * length * deflection_profile(tau) * direction, duration)
+        for direction in deflections(end - start, along)
+    ]
 
 
-def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: int) -> list[_Start]:
+def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, max_arcs: int) -> list[_Start]:
     # Swings about P0 of one arc, two arcs, ...
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
-    line, grown, center = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
+    line, end_fraction, center = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
     center[: len(along)] = rest_point(z0)[along]
     half, swings = np.pi * np.sqrt(z0 / float(tasks.robot.gravity)), list[_Start]()
-    for arcs in range(1, most + 1):
+    for arcs in range(1, max_arcs + 1):
         first, last = np.cos(arcs * np.pi * tau), np.cos(arcs * np.pi * (1.0 - tau))
-        swing = center + (start - center) * (1.0 - grown) * first + (end - center) * grown * last
-        places = np.concatenate([swing[:, : len(along)], line[:, len(along) :]], axis=1)
-        swings.append(_Start(places, arcs * half))
+        swing = center + (start - center) * (1.0 - end_fraction) * first + (end - center) * end_fraction * last
+        samples = np.concatenate([swing[:, : len(along)], line[:, len(along) :]], axis=1)
+        swings.append(_Start(samples, arcs * half))
     return swings
 
 
-def bulge(tau: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """How far motions are bent, at most 1 half-way; at the ends neither place nor velocity changes."""
+def deflection_profile(tau: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """How far motions are deflected, at most 1 half-way; at the ends neither position nor velocity changes."""
     return 16.0 * (tau * (1.0 - tau)) ** 2
 
 
-def ways(chord: Float[np.ndarray, "d"], along: np.ndarray) -> list[np.ndarray]:
-    """Directions in which motions are bent."""
+def deflections(chord: Float[np.ndarray, "d"], along: np.ndarray) -> list[np.ndarray]:
+    """Directions in which motions are deflected, first none."""
     down = np.zeros(len(chord))
     down[np.flatnonzero(along == 2)] = 1.0
     directions = [np.zeros(len(chord)), -down, down]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cspr_jax.families.free.search.basis import Basis
-from cspr_jax.families.free.search.derivatives import InstantValues, instant_values, residuals
+from cspr_jax.families.free.search.derivatives import EquationValues, equation_values, residuals
 from cspr_jax.families.free.search.objectives import Objective
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
@@ -25,22 +25,22 @@ OUTER = 3
 
 
 def wide(numbers: np.ndarray) -> np.ndarray:
-    """Numbers of motions, or of their segments, beside their values at instants."""
+    """Numbers of motions, or of their segments, beside their values at samples."""
     return numbers.reshape(*numbers.shape, *[1] * (5 - numbers.ndim))
 
 
 class Unknowns(NamedTuple):
-    """Unknowns of l motions of s segments, with K control points, m intervals and n instants; or changes of them.
+    """Unknowns of l motions of s segments, with K control points, m intervals and n samples; or changes of them.
 
     Fields:
         inner: (l, s, K - 6, d) control points between the outer ones.
         duration: (l, s) s.
         acceleration: (l, s + 1, d) at the poses, m/s^2, rad/s^2.
         level: (l, s) of the objective, by which bounds of tensions move.
-        values: (l, s, m, n, n_values) as of `instants`.
+        values: (l, s, m, n, n_values) as of `equations`.
         multipliers: (l, s, m, n, n_equations).
-        low_push: (l, s, m, n, n_values) multipliers of lower bounds, at least 0.
-        high_push: (l, s, m, n, n_values) of upper bounds.
+        low_multipliers: (l, s, m, n, n_values) multipliers of lower bounds, at least 0.
+        high_multipliers: (l, s, m, n, n_values) of upper bounds.
     """
 
     inner: np.ndarray
@@ -49,26 +49,26 @@ class Unknowns(NamedTuple):
     level: np.ndarray
     values: np.ndarray
     multipliers: np.ndarray
-    low_push: np.ndarray
-    high_push: np.ndarray
+    low_multipliers: np.ndarray
+    high_multipliers: np.ndarray
 
-    def taken(self, rows: np.ndarray) -> "Unknowns":
+    def take(self, indices: np.ndarray) -> "Unknowns":
         """Unknowns of some of the motions."""
-        return Unknowns(*(leaf[rows] for leaf in self))
+        return Unknowns(*(values[indices] for values in self))
 
 
 class ClearancePlanes(NamedTuple):
-    """Values at + slope . coordinates of instants that have lower bounds beside those of limits, K at each.
+    """Values at + gradient . coordinates that have lower bounds beside those of limits, K at each sample.
 
     Fields:
-        slope: (l, s, m, n, K, d).
+        gradient: (l, s, m, n, K, d).
         at: (l, s, m, n, K).
-        least: of each its number among the meetings of bodies, and the clearance that it stands for, m.
+        minimum: of each the index of the pair of bodies, and the clearance that it stands for, m.
     """
 
-    slope: np.ndarray
+    gradient: np.ndarray
     at: np.ndarray
-    least: tuple[tuple[int, float], ...]
+    minimum: tuple[tuple[int, float], ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Tasks:
         robot: centred, z down.
         limits: of it.
         basis: of all segments.
-        places: (l, s, 2, d) coordinates at start and end of each segment, m; Rodrigues vectors.
+        ends: (l, s, 2, d) coordinates at start and end of each segment, m; Rodrigues vectors.
         velocities: (l, s, 2, d) there, m/s, rad/s.
         references: (l, s, 4) orientations from which Rodrigues vectors count.
         turns: (l, s, 2, d, d) second derivatives of the coordinates from accelerations.
@@ -88,7 +88,7 @@ class Tasks:
         low: (l, s, m, n, n_values) lower bounds at level 0, -inf for none.
         high: (l, s, m, n, n_values) upper bounds at level 0, inf for none.
         scale: (l,) half a swing, s, over which durations count.
-        objective: what is to be least.
+        objective: what is minimised.
         longest: () longest duration of a segment, s; None for any.
         planes: their values are the last ones; None without any.
     """
@@ -96,7 +96,7 @@ class Tasks:
     robot: AnyRobot
     limits: Limits
     basis: Basis
-    places: np.ndarray
+    ends: np.ndarray
     velocities: np.ndarray
     references: np.ndarray
     turns: np.ndarray
@@ -109,13 +109,13 @@ class Tasks:
     longest: np.ndarray | None = None
     planes: ClearancePlanes | None = None
 
-    def taken(self, rows: np.ndarray) -> "Tasks":
+    def take(self, indices: np.ndarray) -> "Tasks":
         """Some of the motions."""
-        names = ("places", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
+        names = ("ends", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
         planes = self.planes
         if planes is not None:
-            planes = planes._replace(slope=planes.slope[rows], at=planes.at[rows])
-        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names}, planes=planes)
+            planes = planes._replace(gradient=planes.gradient[indices], at=planes.at[indices])
+        return dataclasses.replace(self, **{name: getattr(self, name)[indices] for name in names}, planes=planes)
 
     @property
     def n_limited(self) -> int:
@@ -140,10 +140,10 @@ class Tasks:
         """Unknowns of these tasks as those of tasks with other planes."""
         old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
 
-        def changed(leaf: np.ndarray) -> np.ndarray:
-            return np.concatenate([leaf[..., : leaf.shape[-1] - old], np.zeros((*leaf.shape[:-1], new))], axis=-1)
+        def changed(values: np.ndarray) -> np.ndarray:
+            return np.concatenate([values[..., : values.shape[-1] - old], np.zeros((*values.shape[:-1], new))], axis=-1)
 
-        names = "values", "multipliers", "low_push", "high_push"
+        names = "values", "multipliers", "low_multipliers", "high_multipliers"
         unknowns = unknowns._replace(**{name: changed(getattr(unknowns, name)) for name in names})
         unknowns.values[..., self.n_limited :] = values
         return unknowns
@@ -165,115 +165,119 @@ class Tasks:
         return change.values - low, high - change.values
 
     @property
-    def energy_shares(self) -> np.ndarray:
-        """Shares of the instants in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
-        return self.objective.energy / wide(self.scale) * self.basis.shares[..., None]
+    def energy_weights(self) -> np.ndarray:
+        """Weights of the samples in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
+        return self.objective.energy / wide(self.scale) * self.basis.weights[..., None]
 
     def cost(self, unknowns: Unknowns) -> Float[np.ndarray, "l"]:
         """The objective."""
         time = self.objective.time * unknowns.duration.sum(1) / self.scale
         squares = unknowns.values[..., : self.robot.n_cables] ** 2 * wide(unknowns.duration)
-        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        energy = np.sum(self.energy_weights * squares, axis=(1, 2, 3, 4))
         return time + energy + self.objective.level * unknowns.level.sum(1)
 
     def energies(self, unknowns: Unknowns) -> Float[np.ndarray, "l s"]:
         """Integrals of the sum of the squares of the tensions."""
         squares = np.sum(unknowns.values[..., : self.robot.n_cables] ** 2, axis=-1)
         weight = float(self.robot.mass * self.robot.gravity)
-        return weight**2 * unknowns.duration * np.sum(self.basis.shares * squares, axis=(2, 3))
+        return weight**2 * unknowns.duration * np.sum(self.basis.weights * squares, axis=(2, 3))
 
     def cost_change(self, unknowns: Unknowns, change: Unknowns) -> Float[np.ndarray, "l"]:
-        """Slope of the objective along a change."""
+        """Derivative of the objective along a change."""
         cables = self.robot.n_cables
         tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
         squares = wide(change.duration) * tensions**2
         squares = squares + 2.0 * duration * tensions * change.values[..., :cables]
-        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        energy = np.sum(self.energy_weights * squares, axis=(1, 2, 3, 4))
         time = self.objective.time * change.duration.sum(1) / self.scale
         return time + energy + self.objective.level * change.level.sum(1)
 
     @property
     def border(self) -> np.ndarray:
         """Numbers of the outer coordinates that move, of all K d of a segment, (4 d,)."""
-        d, last = self.places.shape[-1], self.basis.controls * self.places.shape[-1]
+        d, last = self.ends.shape[-1], self.basis.controls * self.ends.shape[-1]
         return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
 
     def controls(self, unknowns: Unknowns) -> np.ndarray:
         """All control points."""
-        shape = *unknowns.duration.shape, self.basis.controls, self.places.shape[-1]
+        shape = *unknowns.duration.shape, self.basis.controls, self.ends.shape[-1]
         controls, time = np.empty(shape), unknowns.duration[..., None]
         controls[:, :, OUTER:-OUTER] = unknowns.inner
         for side, sign in ((0, 1.0), (1, -1.0)):
-            place, step = self.places[:, :, side], sign * self.basis.end_slope * time * self.velocities[:, :, side]
-            second_derivative = self.basis.end_bend * time**2 * self._second(unknowns, side)
-            steps = (place, place + step, place + 3.0 * step + second_derivative)
+            end, step = self.ends[:, :, side], sign * self.basis.velocity_step * time * self.velocities[:, :, side]
+            second_derivative = self.basis.acceleration_step * time**2 * self._second(unknowns, side)
+            steps = (end, end + step, end + 3.0 * step + second_derivative)
             for k, value in enumerate(steps):
                 controls[:, :, k if side == 0 else -1 - k] = value
         return controls
 
     def _second(self, unknowns: Unknowns, side: int) -> np.ndarray:
         # Second derivatives in time of the coordinates at the start or end of each segment, (l, s, d).
-        count = self.places.shape[1]
+        count = self.ends.shape[1]
         acceleration = unknowns.acceleration[:, side : count + side]
         return (self.turns[:, :, side] @ acceleration[..., None])[..., 0]
 
-    def border_slopes(self, unknowns: Unknowns) -> np.ndarray:
+    def border_jacobians(self, unknowns: Unknowns) -> np.ndarray:
         """Derivatives of the outer coordinates that move, by what moves them."""
-        d, time, basis = self.places.shape[-1], unknowns.duration[..., None], self.basis
-        slopes = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
+        d, time, basis = self.ends.shape[-1], unknowns.duration[..., None], self.basis
+        jacobians = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
         for side, sign in ((0, 1.0), (1, -1.0)):
             near = slice(0, d) if side == 0 else slice(3 * d, 4 * d)
             far = slice((1 + side) * d, (2 + side) * d)
-            step = sign * basis.end_slope * self.velocities[:, :, side]
-            slopes[:, :, near, 0] = step
-            slopes[:, :, far, 0] = 3.0 * step + 2.0 * basis.end_bend * time * self._second(unknowns, side)
+            step = sign * basis.velocity_step * self.velocities[:, :, side]
+            jacobians[:, :, near, 0] = step
+            jacobians[:, :, far, 0] = 3.0 * step + 2.0 * basis.acceleration_step * time * self._second(unknowns, side)
             columns = slice(1 + side * d, 1 + (1 + side) * d)
-            slopes[:, :, far, columns] = basis.end_bend * time[..., None] ** 2 * self.turns[:, :, side]
-        return slopes
+            jacobians[:, :, far, columns] = basis.acceleration_step * time[..., None] ** 2 * self.turns[:, :, side]
+        return jacobians
 
-    def border_bends(self, unknowns: Unknowns, push: np.ndarray) -> np.ndarray:
+    def border_hessians(self, unknowns: Unknowns, multipliers: np.ndarray) -> np.ndarray:
         """Second derivatives of the outer coordinates, times multipliers."""
-        d, twice = self.places.shape[-1], 2.0 * self.basis.end_bend
-        bends = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
+        d, twice = self.ends.shape[-1], 2.0 * self.basis.acceleration_step
+        hessians = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
         for side in (0, 1):
-            along = push[:, :, (1 + side) * d : (2 + side) * d]
-            bends[:, :, 0, 0] += twice * np.sum(along * self._second(unknowns, side), axis=-1)
+            along = multipliers[:, :, (1 + side) * d : (2 + side) * d]
+            hessians[:, :, 0, 0] += twice * np.sum(along * self._second(unknowns, side), axis=-1)
             mixed = twice * unknowns.duration[..., None] * (along[..., None, :] @ self.turns[:, :, side])[..., 0, :]
             columns = slice(1 + side * d, 1 + (1 + side) * d)
-            bends[:, :, 0, columns] += mixed
-            bends[:, :, columns, 0] += mixed
-        return bends
+            hessians[:, :, 0, columns] += mixed
+            hessians[:, :, columns, 0] += mixed
+        return hessians
 
-    def equations(self, unknowns: Unknowns) -> tuple[InstantValues, np.ndarray]:
-        """Equations at all instants."""
+    def equations(self, unknowns: Unknowns) -> tuple[EquationValues, np.ndarray]:
+        """Equations at all samples."""
         planes = self.planes
         count = unknowns.multipliers.shape[-1] - (0 if planes is None else planes.at.shape[-1])
-        equations = instant_values(*self._instants(unknowns), unknowns.multipliers[..., :count])
+        equations = equation_values(*self._samples(unknowns), unknowns.multipliers[..., :count])
         if planes is not None:
-            others = equations.slope.shape[-1] - self.places.shape[-1]
-            slope = np.concatenate([equations.slope, np.pad(-planes.slope, [*[(0, 0)] * 5, (0, others)])], axis=-2)
+            others = equations.jacobian.shape[-1] - self.ends.shape[-1]
+            jacobian = np.concatenate(
+                [equations.jacobian, np.pad(-planes.gradient, [*[(0, 0)] * 5, (0, others)])], axis=-2
+            )
             residual = self._with_planes(equations.residual, planes, unknowns)
-            equations = equations._replace(residual=residual, slope=slope)
+            equations = equations._replace(residual=residual, jacobian=jacobian)
         return equations, self._with_values(equations.residual.copy(), unknowns)
 
     def residual(self, unknowns: Unknowns) -> Float[np.ndarray, "l s m n n_equations"]:
-        """Residuals of the equations at all instants, with all values."""
-        missed, planes = residuals(*self._instants(unknowns)), self.planes
+        """Residuals of the equations at all samples, with all values."""
+        missed, planes = residuals(*self._samples(unknowns)), self.planes
         return self._with_values(missed if planes is None else self._with_planes(missed, planes, unknowns), unknowns)
 
     def _with_planes(self, residual: np.ndarray, planes: ClearancePlanes, unknowns: Unknowns) -> np.ndarray:
-        places = self.basis.places(self.controls(unknowns))[..., 0, :]
-        return np.concatenate([residual, -planes.at - np.sum(planes.slope * places[..., None, :], axis=-1)], axis=-1)
+        coordinates = self.basis.evaluate(self.controls(unknowns))[..., 0, :]
+        return np.concatenate(
+            [residual, -planes.at - np.sum(planes.gradient * coordinates[..., None, :], axis=-1)], axis=-1
+        )
 
-    def _instants(self, unknowns: Unknowns) -> tuple[Any, ...]:
-        # Arguments of the equations at all instants, but multipliers.
+    def _samples(self, unknowns: Unknowns) -> tuple[Any, ...]:
+        # Arguments of the equations at all samples, but multipliers.
         shape = unknowns.values.shape[:-1]
         return (
             self.robot,
             self.limits,
             self.longest,
             np.broadcast_to(self.references[:, :, None, None], (*shape, 4)),
-            self.basis.places(self.controls(unknowns)),
+            self.basis.evaluate(self.controls(unknowns)),
             np.broadcast_to(unknowns.duration[:, :, None, None], shape),
             unknowns.values[..., : self.robot.n_cables],
         )

@@ -2,8 +2,9 @@
 
 A length that changes by D from rest to rest, with accelerations up to a that speed it up and up to b that slow it
 down, and a speed up to v, takes no less than sqrt(2 D (1/a + 1/b)), or D / v + v (1/a + 1/b) / 2 if it comes to v. That
-holds for the length of each cable, and for the way of the mass centre in every direction e: tensions give it no more
-than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u points up.
+holds for the length of each cable, and for the displacement of the mass centre along every direction e: tensions give
+it no more than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u
+points up.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ from cspr_jax.verification.criteria import judged_poses
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Directions in the vertical plane through both places; what bounds are lowered by, more than their rounding.
+# Directions in the vertical plane through both positions; what bounds are lowered by, more than their rounding.
 ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
-# Heights of spools over the robot's size that count as equal, and what that may add to a share.
+# Heights of spools over the robot's radius that count as equal, and what that may add to a component.
 LEVEL, SLANTED = 1e-12, 1e-5
 Numbers = np.ndarray | float
 
 
 def least_time(
-    way: Float[np.ndarray, "..."], speeding: Numbers, slowing: Numbers, speed: Numbers
+    distance: Float[np.ndarray, "..."], speeding: Numbers, slowing: Numbers, speed: Numbers
 ) -> Float[np.ndarray, "..."]:
-    """Least time of a way from rest to rest."""
+    """Least time of a distance from rest to rest."""
     slowness = 1.0 / np.asarray(speeding) + 1.0 / np.asarray(slowing)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of no cap, no largest acceleration, no way
-        is_capped = np.sqrt(2.0 * way / slowness) > speed
-        capped = way / speed + 0.5 * speed * slowness
-        return np.where(way > 0.0, np.where(is_capped, capped, np.sqrt(2.0 * way * slowness)), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of no cap, no largest acceleration, no distance
+        is_capped = np.sqrt(2.0 * distance / slowness) > speed
+        capped = distance / speed + 0.5 * speed * slowness
+        return np.where(distance > 0.0, np.where(is_capped, capped, np.sqrt(2.0 * distance * slowness)), 0.0)
 
 
 def time_bounds(problem: Problem, motions: list[Spline]) -> Float[np.ndarray, "n"]:
@@ -54,8 +55,8 @@ def time_bounds(problem: Problem, motions: list[Spline]) -> Float[np.ndarray, "n
 def _time_bound(problem: Problem, motion: Spline) -> float:
     robot, limits = problem.robot, problem.limits
     positions, lengths = map(np.asarray, _ends(robot, common_shape(motion)))
-    way = positions[1] - positions[0]
-    bounds = [_of_mass_centre(problem, way)]
+    displacement = positions[1] - positions[0]
+    bounds = [_of_mass_centre(problem, displacement)]
     speed, rise = (
         np.inf if maximum is None else np.asarray(maximum)
         for maximum in (limits.cable_speed_max, limits.cable_acceleration_max)
@@ -72,22 +73,24 @@ def _ends(robot: AnyRobot, motion: Spline) -> tuple[Array, Array]:
     return states.position, jax.vmap(lambda state: cable_motion(robot, state)[0])(states)
 
 
-def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:
+def _of_mass_centre(problem: Problem, displacement: np.ndarray) -> float:
     robot, limits = problem.robot, problem.limits
-    level = np.linalg.norm(way[:2])
-    # Components along the way's level direction and downwards, of directions in which it goes.
+    level = np.linalg.norm(displacement[:2])
+    # Components along the displacement's level direction and downwards, of directions in which it goes.
     directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    along = directions @ np.array([level, way[2]])
+    along = directions @ np.array([level, displacement[2]])
     directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
-    pull = float(np.sum(np.asarray(tension_range(robot, limits)[1]))) / float(robot.mass)
+    cable_acceleration = float(np.sum(np.asarray(tension_range(robot, limits)[1]))) / float(robot.mass)
     maximum = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
     heights, is_point = np.asarray(robot.base_points)[:, 2], not isinstance(robot, PlatformRobot)
     is_level = float(np.ptp(heights)) <= LEVEL * float(spool_radius(robot)) and robot.pulleys is None
-    pulls_up = is_point and is_level and judged_poses(robot)[1]
+    are_upward = is_point and is_level and judged_poses(robot)[1]
 
     def largest(down: np.ndarray) -> np.ndarray:
-        fraction = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
-        return np.clip(np.minimum(fraction + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, maximum)
+        fraction = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if are_upward else np.ones_like(down)
+        return np.clip(
+            np.minimum(fraction + SLANTED, 1.0) * cable_acceleration + float(robot.gravity) * down, 0.0, maximum
+        )
 
     speed = np.inf if limits.speed_max is None else float(limits.speed_max)
     with np.errstate(divide="ignore"):  # where nothing moves

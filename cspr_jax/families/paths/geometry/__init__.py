@@ -3,10 +3,9 @@
 Files, each importing only from those above it:
 
     section          sections, from nodes of Hermite pieces and orientations
-    elements         straight lines and arcs
+    elements         straight lines and arcs; arcs of plans, moves of G-code
     corners          elements one behind another, from stop to stop, with blends
     through_points   polylines and splines through points
-    arcs             arcs of plans, moves of G-code
     path_specs       what a table of a plan says, between its poses
     waypoints        motions of any kind, and their smooth parts between stops
 """

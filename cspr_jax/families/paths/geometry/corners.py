@@ -1,8 +1,8 @@
-"""Corners of paths: elements one behind another, in tracks from stop to stop, blended at corners or not.
+"""Corners of paths: elements one behind another, in parts from stop to stop, blended at corners or not.
 
-A blend is a quintic from a place on one element to a place on the next one, with the place, direction and curvature
-that the elements have there. Between straight lines it ends the distance d from the corner, and passes it at the
-distance 3/8 d sin(angle / 2).
+A blend is a quintic from a point on one element to a point on the next one, with the position, direction and
+curvature that the elements have there. Between straight lines it ends the distance d from the corner, and passes it at
+the distance 3/8 d sin(angle / 2).
 """
 
 import itertools
@@ -12,13 +12,13 @@ from typing import Literal
 import numpy as np
 
 from cspr_jax.families.paths.geometry.elements import Element, Nodes
-from cspr_jax.families.paths.geometry.section import Track
+from cspr_jax.families.paths.geometry.section import PositionPath
 
 # Directions that differ by less go on, rad; below the second, rounded numbers are to blame, and corners are blended.
 SAME_DIRECTION, ROUNDED_DIRECTION = 1e-9, 1e-3
 # Distance within which such corners are blended, m.
 ROUNDED = 1e-6
-# Sharper corners turn back, so that a blend would almost stand still there, rad.
+# Sharper corners turn back, so that a motion along a blend would almost stop there, rad.
 TURNING_BACK = 2.9
 # Part of an element that a blend takes at most.
 LARGEST_SHARE = 0.49
@@ -26,12 +26,14 @@ LARGEST_SHARE = 0.49
 Corners = Literal["every", "stop", "blend"]
 
 
-def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance: float = 0.0) -> list[Track]:
-    """Tracks from stop to stop; the points of each are the ends of its elements."""
+def position_paths_of(
+    elements: Sequence[Element], corners: Corners = "stop", tolerance: float = 0.0
+) -> list[PositionPath]:
+    """Paths from stop to stop; the points of each are the ends of its elements."""
     lengths = _blend_lengths(elements, corners, tolerance)
     splits = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
     return [
-        _track(elements[first:end], np.array([0.0, *lengths[first : end - 1], 0.0]))
+        _position_path(elements[first:end], np.array([0.0, *lengths[first : end - 1], 0.0]))
         for first, end in itertools.pairwise(splits)
     ]
 
@@ -40,7 +42,7 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
     # Lengths that blends take off the elements at each corner; 0 where the direction goes on, NaN where motions stop.
     if corners == "every":
         return np.full(len(elements) - 1, np.nan)
-    size = np.array([element.length for element in elements])
+    element_lengths = np.array([element.length for element in elements])
     directions = np.array([element.at(np.array([0.0, element.length])).first for element in elements])
     one, other = directions[:-1, 1], directions[1:, 0]
     angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
@@ -50,34 +52,36 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
     is_stop = ends_at_rest | ~moves[:-1] | ~moves[1:] | (~is_rounded & ((corners == "stop") | (angles > TURNING_BACK)))
     allowed = np.where(is_rounded, max(tolerance, ROUNDED) if corners == "blend" else ROUNDED, tolerance)
     sines = np.sin(0.5 * np.where(turns, angles, 1.0))
-    largest = LARGEST_SHARE * np.minimum(size[:-1], size[1:])
+    largest = LARGEST_SHARE * np.minimum(element_lengths[:-1], element_lengths[1:])
     lengths = np.where(turns, np.minimum((1.0 - 1e-12) * allowed / (0.375 * sines), largest), 0.0)
     lengths[is_stop] = np.nan
-    rows = np.flatnonzero(lengths > 0.0)
-    while len(rows):
-        ends = [elements[i].at(size[i] - lengths[[i]]) for i in rows.tolist()]
-        starts = [elements[i + 1].at(lengths[[i]]) for i in rows.tolist()]
-        offsets = _middles(ends, starts, lengths[rows]).place - np.array([elements[i + 1].start for i in rows.tolist()])
-        missed = np.linalg.norm(offsets, axis=1) / allowed[rows]
-        rows, missed = rows[missed > 1.0], missed[missed > 1.0]
-        lengths[rows] *= np.maximum(0.5, 0.99 / missed)
+    open_corners = np.flatnonzero(lengths > 0.0)
+    while len(open_corners):
+        ends = [elements[i].at(element_lengths[i] - lengths[[i]]) for i in open_corners.tolist()]
+        starts = [elements[i + 1].at(lengths[[i]]) for i in open_corners.tolist()]
+        offsets = _middles(ends, starts, lengths[open_corners]).position - np.array(
+            [elements[i + 1].start for i in open_corners.tolist()]
+        )
+        missed = np.linalg.norm(offsets, axis=1) / allowed[open_corners]
+        open_corners, missed = open_corners[missed > 1.0], missed[missed > 1.0]
+        lengths[open_corners] *= np.maximum(0.5, 0.99 / missed)
     return lengths
 
 
 def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarray) -> Nodes:
     # Middles of quintics from last nodes to first ones, over twice the lengths.
-    _, place, first, second = (np.array([column[-1] for column in columns]) for columns in zip(*before, strict=True))
+    _, position, first, second = (np.array([column[-1] for column in columns]) for columns in zip(*before, strict=True))
     _, *ends = (np.array([column[0] for column in columns]) for columns in zip(*after, strict=True))
     length = lengths[:, None]
     return Nodes(
         lengths,
-        0.5 * (place + ends[0]) + 0.3125 * length * (first - ends[1]) + 0.0625 * length**2 * (second + ends[2]),
-        0.9375 * (ends[0] - place) / length - 0.4375 * (first + ends[1]) - 0.0625 * length * (second - ends[2]),
+        0.5 * (position + ends[0]) + 0.3125 * length * (first - ends[1]) + 0.0625 * length**2 * (second + ends[2]),
+        0.9375 * (ends[0] - position) / length - 0.4375 * (first + ends[1]) - 0.0625 * length * (second - ends[2]),
         0.75 * (ends[1] - first) / length - 0.25 * (second + ends[2]),
     )
 
 
-def _track(elements: Sequence[Element], lengths: np.ndarray) -> Track:
+def _position_path(elements: Sequence[Element], lengths: np.ndarray) -> PositionPath:
     # Join elements, of which the lengths, one more than elements, are taken off at both ends.
     lines = [
         element.nodes(before, element.length - after)
@@ -88,10 +92,10 @@ def _track(elements: Sequence[Element], lengths: np.ndarray) -> Track:
     if len(blended):
         blends = _middles([lines[i - 1] for i in blended], [lines[i] for i in blended], lengths[blended])
         middles = {i: Nodes(*(column[[k]] for column in blends)) for k, i in enumerate(blended.tolist())}
-    parts, speeds, marks, s = list[Nodes](), list[np.ndarray](), list[float](), 0.0
+    parts, speeds, knots, s = list[Nodes](), list[np.ndarray](), list[float](), 0.0
     for i, (element, line, length) in enumerate(zip(elements, lines, lengths.tolist(), strict=False)):
         slowest = min(element.speed, elements[i - 1].speed)
-        marks.append(s + length)
+        knots.append(s + length)
         if length:
             parts.append(middles[i]._replace(s=np.array([s + length])))
         if i:
@@ -101,7 +105,9 @@ def _track(elements: Sequence[Element], lengths: np.ndarray) -> Track:
         s = float(parts[-1].s[-1])
     joined = Nodes(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     twice = np.flatnonzero(joined.s[1:] == joined.s[:-1])
-    for values in (joined.place, joined.first) if len(twice) else ():
+    for values in (joined.position, joined.first) if len(twice) else ():
         # Elements miss each other by rounding.
         values[twice] = values[twice + 1] = 0.5 * (values[twice] + values[twice + 1])
-    return Track(joined.s, joined.place, joined.first, joined.second, np.concatenate(speeds), np.array([*marks, s]))
+    return PositionPath(
+        joined.s, joined.position, joined.first, joined.second, np.concatenate(speeds), np.array([*knots, s])
+    )

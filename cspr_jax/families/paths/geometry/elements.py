@@ -1,19 +1,24 @@
-"""Elements of paths: straight lines and arcs, over their travelled length."""
+"""Elements of paths: straight lines and arcs, over their travelled length; arcs of plans, and moves of G-code."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cspr_jax.config.gcode.reading import Move
+from cspr_jax.errors import InputError
+
 if TYPE_CHECKING:
     from jaxtyping import Float
 
+
 # Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
 LARGEST_PIECE = 0.125
-# Places that are nearer to each other are one place, m.
+# Positions that are nearer to each other are one position, m.
 SAME_PLACE = 1e-9
 
 
@@ -22,13 +27,13 @@ class Nodes(NamedTuple):
 
     Fields:
         s: (n,) travelled length, m.
-        place: (n, 3) m.
+        position: (n, 3) m.
         first: (n, 3) derivative with respect to s, of length 1.
         second: (n, 3) second derivative, 1/m.
     """
 
     s: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     first: np.ndarray
     second: np.ndarray
 
@@ -68,9 +73,9 @@ class Straight:
     def at(self, s: Float[np.ndarray, "n"]) -> Nodes:
         """States at lengths."""
         fraction, step = (s / self.length)[:, None], (self.end - self.start) / self.length
-        # Whole lines meet their ends without rounding.
-        place = self.start * (1.0 - fraction) + self.end * fraction
-        return Nodes(s, place, np.array([step] * len(s)), np.zeros((len(s), 3)))
+        # This form meets the ends of lines without rounding.
+        position = self.start * (1.0 - fraction) + self.end * fraction
+        return Nodes(s, position, np.array([step] * len(s)), np.zeros((len(s), 3)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,8 +108,8 @@ class Arc:
 
     @property
     def end(self) -> np.ndarray:
-        """Place of its end, (3,) m."""
-        return self.at(np.array([self.length])).place[0]
+        """Position of its end, (3,) m."""
+        return self.at(np.array([self.length])).position[0]
 
     def nodes(self, first: float, last: float) -> Nodes:
         """Nodes between two lengths, near enough to each other for quintic pieces; see `Straight.nodes`."""
@@ -123,3 +128,35 @@ class Arc:
 
 
 Element = Straight | Arc
+
+
+# Part of its radius by which an arc may begin beside the plane of its centre: rounding.
+BESIDE = 1e-6
+
+
+def arc_of(
+    centre: Float[np.ndarray, "3"], start: Float[np.ndarray, "3"], normal: Float[np.ndarray, "3"], angle: float
+) -> Arc:
+    """Arc of a circle."""
+    axis = normal / np.linalg.norm(normal)
+    radius = start - centre
+    height = float(radius @ axis)
+    distance = float(np.linalg.norm(radius - height * axis))
+    if distance == 0.0 or abs(height) > BESIDE * distance:
+        allowed = "in a plane with the start, normal to `normal`, and apart from it"
+        raise InputError("centre", centre.tolist(), allowed)
+    return Arc(centre + height * axis, start, axis, angle)
+
+
+def elements_of(moves: Sequence[Move]) -> list[Element]:
+    """Lines, arcs and helices of moves, each with a stop behind it where the program pauses."""
+    elements: list[Element] = []
+    for move in moves:
+        start, end = np.array(move.start), np.array(move.end)
+        if move.centre is None:
+            elements.append(Straight(start, end, speed=move.speed, ends_at_rest=move.ends_at_rest))
+        else:
+            centre, axis = np.roll([*move.centre, move.start[move.normal]], move.normal + 1), np.eye(3)[move.normal]
+            rise = float((end - start)[move.normal])
+            elements.append(Arc(centre, start, axis, move.angle, rise, move.speed, ends_at_rest=move.ends_at_rest))
+    return elements

@@ -1,4 +1,4 @@
-"""Courses of paths between poses: what a table of a plan says, as tracks with orientations at their marks."""
+"""Paths between poses as a table of a plan has them: parts from stop to stop, with orientations at their knots."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from cspr_jax.config.keys.path import PathTable
 from cspr_jax.config.motions.text import read
 from cspr_jax.curves.interpolation import continuous
 from cspr_jax.errors import InputError
-from cspr_jax.families.paths.geometry.arcs import arc_of, elements_of
-from cspr_jax.families.paths.geometry.corners import Corners, tracks_of
-from cspr_jax.families.paths.geometry.section import Section, Track, half_angles, section_of, turn
+from cspr_jax.families.paths.geometry.corners import Corners, position_paths_of
+from cspr_jax.families.paths.geometry.elements import arc_of, elements_of
+from cspr_jax.families.paths.geometry.section import PositionPath, Section, half_angles, section_of, turn
 from cspr_jax.families.paths.geometry.through_points import chords, through_points
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.tolerances import UNIT_NORM
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 MEETING = 1e-6
 
 
-class CourseEnds(NamedTuple):
-    """CourseEnds of a course, as far as poses decide them.
+class PathEnds(NamedTuple):
+    """Ends of a path, as far as poses decide them.
 
     Fields:
         start: (3,) m; None: the path decides.
@@ -44,7 +44,7 @@ class CourseEnds(NamedTuple):
 
 
 class FileAxes(NamedTuple):
-    """FileAxes of a robot file.
+    """Axes of a robot file.
 
     Fields:
         z_axis: "up" or "down".
@@ -57,49 +57,49 @@ class FileAxes(NamedTuple):
     turning: np.ndarray
 
 
-class Course(NamedTuple):
-    """Tracks one behind another, with the motion at rest between them.
+class PathSpec(NamedTuple):
+    """Paths one behind another, with the motion at rest between them.
 
     Fields:
-        tracks: at least one.
-        quaternions: for each the orientations at its marks, (k, 4) unit quaternions; empty: of a point mass.
+        parts: at least one.
+        quaternions: for each the orientations at its knots, (k, 4) unit quaternions; empty: of a point mass.
         is_planar: whether it was read without y.
         feeds: as of `Section`.
         notes: what its user should know of a file, in lines.
     """
 
-    tracks: list[Track]
+    parts: list[PositionPath]
     quaternions: list[np.ndarray]
     is_planar: bool = False
     feeds: Mapping[float, str] = MappingProxyType({})
     notes: Sequence[str] = ()
 
     def sections(self) -> list[Section]:
-        """The tracks with their orientations."""
+        """The parts with their orientations."""
         units = self.quaternions
-        sections = [section_of(track, units[i] if units else None) for i, track in enumerate(self.tracks)]
+        sections = [section_of(part, units[i] if units else None) for i, part in enumerate(self.parts)]
         return [section._replace(feeds=self.feeds) for section in sections]
 
 
-def course_through(
+def path_through(
     table: PathTable, points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None
-) -> Course:
-    """Course through points."""
+) -> PathSpec:
+    """Path through points."""
     closed = table.closed is True
     tolerance = table.blend_tolerance or 0.0
-    tracks = through_points(
+    parts = through_points(
         table.curve, points, quaternions, corner=table.corner or "stop", tolerance=tolerance, closed=closed
     )
     turnings, first = [], 0
-    for track in tracks:
-        last = first + len(track.marks) - 1
+    for part in parts:
+        last = first + len(part.knots) - 1
         turnings.append(None if quaternions is None else quaternions[first : last + 1])
         first = last
-    return Course(tracks, [turning for turning in turnings if turning is not None])
+    return PathSpec(parts, [turning for turning in turnings if turning is not None])
 
 
-def course_of(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) -> Course:
-    """Course of a table that has its own places."""
+def path_of(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes) -> PathSpec:
+    """Path of a table that has its own points."""
     if table.points is not None or table.kind == "csv":
         return _through_own(table, ends, folder, axes)
     units = orientations(table, 1 if table.kind == "gcode" else 2)
@@ -111,15 +111,15 @@ def course_of(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) 
         from cspr_jax.config.gcode.reading import read_program
 
         moves, notes = read_program(folder / str(table.file), start)
-        tracks = tracks_of(elements_of(moves), rule, table.blend_tolerance or 0.0)
+        parts = position_paths_of(elements_of(moves), rule, table.blend_tolerance or 0.0)
         first = ends.first
-        turnings = [] if first is None else [np.tile(first, (len(track.marks), 1)) for track in tracks]
-        return Course(tracks, turnings, feeds={move.speed: move.feed for move in moves}, notes=notes)
+        turnings = [] if first is None else [np.tile(first, (len(part.knots), 1)) for part in parts]
+        return PathSpec(parts, turnings, feeds={move.speed: move.feed for move in moves}, notes=notes)
     axis = axes.normal if table.normal is None else np.asarray(table.normal)
     angle = 2.0 * np.pi if table.angle is None else table.angle
     start = np.asarray(table.start, float) if ends.start is None else ends.start
-    tracks = tracks_of([arc_of(np.asarray(table.centre, float), start, axis, angle)])
-    return Course(tracks, [] if ends.first is None or ends.last is None else [np.stack([ends.first, ends.last])])
+    parts = position_paths_of([arc_of(np.asarray(table.centre, float), start, axis, angle)])
+    return PathSpec(parts, [] if ends.first is None or ends.last is None else [np.stack([ends.first, ends.last])])
 
 
 def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] | None:
@@ -130,21 +130,21 @@ def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] |
     if len(units) not in (1, count):
         allowed = f"must be one, or {count}" if count > 1 else "must be one"
         raise InputError("orientations", None, allowed, problem=f"{len(units)} of them")
-    sizes = np.linalg.norm(units, axis=1, keepdims=True)
-    odd = np.flatnonzero(np.abs(sizes[:, 0] - 1.0) > UNIT_NORM)
+    norms = np.linalg.norm(units, axis=1, keepdims=True)
+    odd = np.flatnonzero(np.abs(norms[:, 0] - 1.0) > UNIT_NORM)
     if len(odd):
         i = int(odd[0])
-        raise InputError(f"orientations[{i}]", units[i].tolist(), f"of length 1 (it has {float(sizes[i, 0]):.7g})")
-    return np.broadcast_to(units / sizes, (count, 4))
+        raise InputError(f"orientations[{i}]", units[i].tolist(), f"of length 1 (it has {float(norms[i, 0]):.7g})")
+    return np.broadcast_to(units / norms, (count, 4))
 
 
-def _through_own(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) -> Course:
-    # Course through points of the table, or of its file, and the poses at its ends.
+def _through_own(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes) -> PathSpec:
+    # Path through points of the table, or of its file, and the poses at its ends.
     units, is_planar, notes = None, False, list[str]()
     if table.kind == "csv":
-        rows = read(folder / str(table.file), has_times=False).in_axes(axes.z_axis)
-        points, units, is_planar = rows.positions, rows.quaternions, rows.is_planar
-        notes = [f"{table.file}: {note}" for note in rows.notes]
+        samples = read(folder / str(table.file), has_times=False).in_axes(axes.z_axis)
+        points, units, is_planar = samples.positions, samples.quaternions, samples.is_planar
+        notes = [f"{table.file}: {note}" for note in samples.notes]
         if units is not None:
             units = products(units, axes.turning[None])
     else:
@@ -166,13 +166,13 @@ def _through_own(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxe
     if units is None and ends.first is not None and ends.last is not None:
         s = np.concatenate([[0.0], np.cumsum(chords(points))])
         units = turn(continuous(np.stack([ends.first, ends.last])), s / s[-1])[0]
-    return course_through(table, points, units)._replace(is_planar=is_planar, notes=notes)
+    return path_through(table, points, units)._replace(is_planar=is_planar, notes=notes)
 
 
-def _check_start(place: np.ndarray, unit: np.ndarray | None, ends: CourseEnds, file: str | None) -> None:
+def _check_start(position: np.ndarray, unit: np.ndarray | None, ends: PathEnds, file: str | None) -> None:
     # Refuse a file that does not begin at the pose before it.
-    if np.linalg.norm(place - ends.start) > MEETING:
-        raise InputError("file", file, f"one that begins where the pose before is, not at {place.round(6).tolist()}")
+    if np.linalg.norm(position - ends.start) > MEETING:
+        raise InputError("file", file, f"one that begins where the pose before is, not at {position.round(6).tolist()}")
     if (
         unit is not None
         and ends.first is not None
@@ -182,12 +182,12 @@ def _check_start(place: np.ndarray, unit: np.ndarray | None, ends: CourseEnds, f
 
 
 def _between_poses(
-    points: np.ndarray, units: np.ndarray | None, ends: CourseEnds
+    points: np.ndarray, units: np.ndarray | None, ends: PathEnds
 ) -> tuple[np.ndarray, np.ndarray | None]:
     # Add what the poses before and behind the points have.
-    for place, unit, before in ((ends.start, ends.first, True), (ends.end, ends.last, False)):
-        if place is not None:
-            points = np.concatenate([place[None], points] if before else [points, place[None]])
+    for position, unit, before in ((ends.start, ends.first, True), (ends.end, ends.last, False)):
+        if position is not None:
+            points = np.concatenate([position[None], points] if before else [points, position[None]])
             if units is not None and unit is not None:
                 units = np.concatenate([unit[None], units] if before else [units, unit[None]])
     return points, units

@@ -30,23 +30,23 @@ class Section(NamedTuple):
         curve: positions and orientations over s, m, in place of time; continuous, with its first derivative; NumPy
             leaves. Its second derivative may jump between pieces.
         speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
-        marks: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
+        knots: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
         feeds: such speeds as G-code has them, by their values in m/s.
     """
 
     curve: Spline
     speed: np.ndarray
-    marks: np.ndarray
+    knots: np.ndarray
     feeds: Mapping[float, str] = MappingProxyType({})
 
 
 class SectionSettings(NamedTuple):
-    """SectionSettings of the motion along a section.
+    """Settings of the motion along a section.
 
     Fields:
         grid: number of cells.
         ramp_time: time in which accelerations rise and fall, s; 0: they jump.
-        start_speed: speed at its start, that of the place and not of s, m/s.
+        start_speed: speed at its start, that of the position and not of s, m/s.
         end_speed: speed at its end, likewise, m/s.
     """
 
@@ -57,45 +57,45 @@ class SectionSettings(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Track:
-    """Places of a section, as nodes of Hermite pieces.
+class PositionPath:
+    """Positions of a section, as nodes of Hermite pieces.
 
     Fields:
         s: (n,) increasing, from 0; two nodes at one s where the second derivative jumps.
-        place: (n, 3) m.
+        position: (n, 3) m.
         first: (n, 3) derivative with respect to s.
         second: (n, 3) second derivative, 1/m.
         speed: (n - 1,) largest speed of each piece, m/s; also of the empty ones.
-        marks: (k,) s of its points, each one of `s`.
+        knots: (k,) s of its points, each one of `s`.
     """
 
     s: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     first: np.ndarray
     second: np.ndarray
     speed: np.ndarray
-    marks: np.ndarray
+    knots: np.ndarray
 
     def table(self) -> Float[np.ndarray, "m 6 3"]:
         """Bernstein coefficients of the pieces that are not empty."""
-        return hermite(self.s, [self.place, self.first, self.second])
+        return hermite(self.s, [self.position, self.first, self.second])
 
-    def refined(self, s: Float[np.ndarray, "k"]) -> "Track":
-        """The same track with more nodes."""
+    def refined(self, s: Float[np.ndarray, "k"]) -> "PositionPath":
+        """The same path with more nodes."""
         knots, behind = np.unique(self.s), np.searchsorted(self.s, s)
         curve = BPoly(np.moveaxis(self.table(), 1, 0), knots)
         added = {
             name: np.insert(getattr(self, name), behind, curve(s, order), axis=0)
-            for order, name in enumerate(("place", "first", "second"))
+            for order, name in enumerate(("position", "first", "second"))
         }
         speed = np.insert(self.speed, behind - 1, self.speed[behind - 1])
         return dataclasses.replace(self, s=np.insert(self.s, behind, s), speed=speed, **added)
 
 
-def section_of(track: Track, quaternions: Float[np.ndarray, "k 4"] | None = None) -> Section:
-    """Section of a track and of orientations at its marks.
+def section_of(path: PositionPath, quaternions: Float[np.ndarray, "k 4"] | None = None) -> Section:
+    """Section of positions and of orientations at their knots.
 
-    Between two marks the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
+    Between two knots the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
     """
     turning = None
     if quaternions is not None:
@@ -103,23 +103,23 @@ def section_of(track: Track, quaternions: Float[np.ndarray, "k 4"] | None = None
         halves = half_angles(units)
         steady = len(units) == 2
         if steady:
-            track = track.refined(_between(track.s, LARGEST_TURN * track.s[-1] / max(halves[0], LARGEST_TURN)))
+            path = path.refined(_between(path.s, LARGEST_TURN * path.s[-1] / max(halves[0], LARGEST_TURN)))
         if halves.max() <= SAME_ORIENTATION:
-            turning = np.broadcast_to(units[0], (int((np.diff(track.s) > 0.0).sum()), 6, 4))
+            turning = np.broadcast_to(units[0], (int((np.diff(path.s) > 0.0).sum()), 6, 4))
         elif steady:
-            turning = hermite(track.s, turn(units, track.s / track.s[-1], track.s[-1]))
+            turning = hermite(path.s, turn(units, path.s / path.s[-1], path.s[-1]))
         else:
-            rates = interpolated(track.marks, np.zeros((len(units), 3)), units, ends="natural")
-            curve = BPoly(np.moveaxis(np.asarray(rates.quaternion), 1, 0), track.marks)
-            turning = hermite(track.s, [curve(track.s, order) for order in range(3)])
+            rates = interpolated(path.knots, np.zeros((len(units), 3)), units, ends="natural")
+            curve = BPoly(np.moveaxis(np.asarray(rates.quaternion), 1, 0), path.knots)
+            turning = hermite(path.s, [curve(path.s, order) for order in range(3)])
     curve = Spline(
-        as_float64(np.unique(track.s)), as_float64(track.table()), None if turning is None else as_float64(turning)
+        as_float64(np.unique(path.s)), as_float64(path.table()), None if turning is None else as_float64(turning)
     )
-    return Section(curve, track.speed[np.diff(track.s) > 0.0], track.marks)
+    return Section(curve, path.speed[np.diff(path.s) > 0.0], path.knots)
 
 
 def _between(s: np.ndarray, width: float) -> np.ndarray:
-    # Places that cut intervals wider than a width.
+    # Values of s that cut intervals wider than a width.
     counts = np.ceil(np.diff(s) / width).astype(int)
     cuts = [np.linspace(a, b, count + 1)[1:-1] for a, b, count in zip(s[:-1], s[1:], counts, strict=True)]
     return np.concatenate(cuts)
@@ -127,8 +127,8 @@ def _between(s: np.ndarray, width: float) -> np.ndarray:
 
 def half_angles(units: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n-1"]:
     """Halves of the angles between consecutive orientations."""
-    apart, together = (np.linalg.norm(units[1:] + sign * units[:-1], axis=1) for sign in (-1.0, 1.0))
-    return 2.0 * np.arctan2(apart, together)
+    differences, sums = (np.linalg.norm(units[1:] + sign * units[:-1], axis=1) for sign in (-1.0, 1.0))
+    return 2.0 * np.arctan2(differences, sums)
 
 
 def turn(units: Float[np.ndarray, "2 4"], fraction: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:

@@ -10,14 +10,14 @@ from scipy.interpolate import BPoly
 
 from cspr_jax.curves.interpolation import continuous, interpolated
 from cspr_jax.errors import InputError
-from cspr_jax.families.paths.geometry.corners import Corners, tracks_of
+from cspr_jax.families.paths.geometry.corners import Corners, position_paths_of
 from cspr_jax.families.paths.geometry.elements import SAME_PLACE, Straight
-from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, Track, half_angles
+from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, PositionPath, half_angles
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
+# Part of the speed along the chords below which a spline stops, and samples of each of its pieces.
 STANDING, SAMPLES = 1e-6, 32
 # Shortest chord of a spline over its longest one: the digits of its pieces are lost below.
 SMALLEST_CHORD = 1e-6
@@ -47,13 +47,13 @@ def through_points(
     corner: str = "stop",
     tolerance: float = 0.0,
     closed: bool = False,
-) -> list[Track]:
-    """Tracks through points; each mark is at one of them, or at the corner that is blended there."""
+) -> list[PositionPath]:
+    """Paths through points; each knot is at one of them, or at the corner that is blended there."""
     lengths = chords(points, quaternions)
     if kind in ("line", "polyline") or len(points) == 2:
         lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]
         rule: Corners = "every" if kind == "line" else "blend" if corner == "blend" else "stop"
-        return tracks_of(lines, rule, tolerance)
+        return position_paths_of(lines, rule, tolerance)
     close = np.flatnonzero(lengths < SMALLEST_CHORD * lengths.max())
     if len(close):
         allowed = f"at least {SMALLEST_CHORD:g} of the longest step from the point before it, {lengths.max():.3g} m"
@@ -61,11 +61,11 @@ def through_points(
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
     values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)
-    place, first, second = (values(s, order) for order in range(3))
+    position, first, second = (values(s, order) for order in range(3))
     # The last value comes from the last piece, so nothing is lost where ends are natural.
     fine = np.concatenate([np.linspace(*ends, SAMPLES, endpoint=False) for ends in itertools.pairwise(s)])
     speeds = np.linalg.norm(values(fine, 1), axis=1)
     if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():
         i = int(np.argmin(speeds)) // SAMPLES
         raise InputError("points", None, "must make a curve that turns back nowhere", problem=f"behind points[{i}]")
-    return [Track(s, place, first, second, np.full(len(lengths), np.inf), s)]
+    return [PositionPath(s, position, first, second, np.full(len(lengths), np.inf), s)]

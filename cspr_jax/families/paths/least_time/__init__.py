@@ -14,8 +14,7 @@ Files, each importing only from those above it:
     timed              motions in time from path speeds
     tightening         what a motion misses between nodes, and what binds it
     jumping            the fastest motions of several sections, whose accelerations jump
-    constraint_names   names of half-planes
     static_tension     tension that keeps a robot from standing still
-    refusals           the place that no path speed passes
+    refusals           the point that no path speed passes, and names of half-planes there
     least_time         the fastest motion along a section
 """

@@ -14,7 +14,7 @@ from cspr_jax.families.paths.least_time.constraints import TINY, tangent_directi
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.duality import Multipliers, SpeedMultipliers, lower_bound
 from cspr_jax.families.paths.least_time.multipliers import dual_multipliers
-from cspr_jax.families.paths.least_time.nodes import BATCH, Places, places_on, state_at
+from cspr_jax.families.paths.least_time.nodes import BATCH, PathPoints, points_on, state_at
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
@@ -27,55 +27,55 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # x at which the search for multipliers begins, at least, over its largest value.
-LEAST = 1e-9
+SMALLEST = 1e-9
 
 
 def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]) -> float:
     """Rigorous lower bound of the time of any motion that goes forward along a section."""
     robot, limits, curve, grid = problem.robot, problem.limits, path.section.curve, path.grid
-    middles = np.maximum(0.5 * (x[1:] + x[:-1]), LEAST * x.max())
-    of_nodes, of_cells = dual_multipliers(path.dual_rows(), path.ends, middles)
-    nodes = places_on(curve, grid.nodes, ahead=True)
+    middles = np.maximum(0.5 * (x[1:] + x[:-1]), SMALLEST * x.max())
+    of_nodes, of_cells = dual_multipliers(path.dual_half_planes(), path.ends, middles)
+    nodes = points_on(curve, grid.nodes, ahead=True)
     values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), batch_size=BATCH)
-    centres = places_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
+    centres = points_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
     rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), batch_size=BATCH)
     return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
+def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[PathPoints, Array]) -> tuple[Array, Array, Array]:
     # Multipliers of what the half-planes are made of, from those of the half-planes.
-    def one(place: Places, multipliers: Array) -> tuple[Array, Array, Array]:
-        state = state_at(place)
+    def one(point: PathPoints, multipliers: Array) -> tuple[Array, Array, Array]:
+        state = state_at(point)
         matrix = unit_wrenches(robot, state).matrix
         along = tension_faces(robot, limits, matrix).along
         count, n_cables = along.shape
         wrench = -(multipliers[:count] @ along @ right_inverse(matrix)) / (robot.mass * robot.gravity)
-        second_derivative, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), multipliers[count:]
+        cable_acceleration, acceleration, rest = jnp.zeros(n_cables), jnp.zeros(3), multipliers[count:]
         if limits.cable_acceleration_max is not None:
-            second_derivative, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
+            cable_acceleration, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
         if limits.acceleration_max is not None:
-            turn = rest @ tangent_directions(state.velocity, state.acceleration)
-        return wrench, second_derivative, turn
+            acceleration = rest @ tangent_directions(state.velocity, state.acceleration)
+        return wrench, cable_acceleration, acceleration
 
     return jax.vmap(one)(*nodes)
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
+def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[PathPoints, Array, Array]) -> tuple[Array, Array]:
     # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
-    def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:
-        state = state_at(place)
+    def one(point: PathPoints, speed_max: Array, multiplier: Array) -> tuple[Array, Array]:
+        state = state_at(point)
         none, square = jnp.zeros(robot.n_cables), jnp.maximum(jnp.sum(state.velocity**2), TINY)
         if limits.cable_speed_max is None:
-            return none, pressure / square
+            return none, multiplier / square
         rates = jnp.square(cable_motion(robot, state)[1])
-        shares = rates / jnp.square(limits.cable_speed_max)
-        nearest = jnp.argmax(shares)
-        is_cable = shares[nearest] >= square / jnp.square(most)
+        ratios = rates / jnp.square(limits.cable_speed_max)
+        nearest = jnp.argmax(ratios)
+        is_cable = ratios[nearest] >= square / jnp.square(speed_max)
         of_cables = jnp.where(
-            is_cable & (jnp.arange(robot.n_cables) == nearest), pressure / jnp.maximum(rates, TINY), none
+            is_cable & (jnp.arange(robot.n_cables) == nearest), multiplier / jnp.maximum(rates, TINY), none
         )
-        return of_cables, jnp.where(is_cable, 0.0, pressure / square)
+        return of_cables, jnp.where(is_cable, 0.0, multiplier / square)
 
     return jax.vmap(one)(*cells)

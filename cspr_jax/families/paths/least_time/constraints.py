@@ -1,6 +1,6 @@
 """Half-planes of path acceleration u = s'' and squared path speed x = s'^2 in which a motion along a path stays.
 
-At one place of a path the acceleration is p' u + p'' x, so that the wrench that the cables must supply is
+At one point of a path the acceleration is p' u + p'' x, so that the wrench that the cables must supply is
 a u + b x + r, with the momentum a of a unit path speed, its derivative b along the path, and the weight r. Each face of
 the set of wrenches that the cables can give, each limit of a cable's acceleration, and each tangent of the largest
 Cartesian acceleration is one half-plane (Bobrow, Dubowsky and Gibson 1985; Verscheure et al. 2009; Pham and Pham 2018).
@@ -28,26 +28,29 @@ if TYPE_CHECKING:
 
 # Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
 TANGENTS = 24
-# Squared sizes that are taken to be no smaller, so that quotients stay finite.
+# Squared norms that are taken to be no smaller, so that quotients stay finite.
 TINY = 1e-30
 StateKind = TypeVar("StateKind", State, StateBounds)
 
 
-class Rows(NamedTuple):
-    """Half-planes u_share u + x_share x <= most of one place; of n_rows, without units where they bound tensions.
+class HalfPlanes(NamedTuple):
+    """Half-planes u_coefficient u + x_coefficient x <= bound of one point.
+
+    Those that bound tensions are without units.
 
     Fields:
-        u: (..., n_rows) share of the path acceleration.
-        x: (..., n_rows) share of the squared path speed.
-        most: (..., n_rows) bound.
-        size: (..., n_rows) what the bound loses for a margin of 1: N of tensions, all of its value of accelerations.
+        u: (..., n_rows) coefficient of the path acceleration.
+        x: (..., n_rows) coefficient of the squared path speed.
+        bound: (..., n_rows) bound.
+        margin_loss: (..., n_rows) what the bound loses for a margin of 1: N of tensions, all of its value of
+            accelerations.
         cap: (...) largest x that speeds allow, inf for none.
     """
 
     u: Array
     x: Array
-    most: Array
-    size: Array
+    bound: Array
+    margin_loss: Array
     cap: Array
 
 
@@ -62,65 +65,65 @@ class UnitWrenches(NamedTuple):
     Fields:
         matrix: (dof, n_cables) wrenches of unit tensions.
         momentum: of a unit path speed.
-        second_derivative: its derivative along the path.
+        momentum_rate: its derivative along the path.
         rest: what holds the weight.
     """
 
     matrix: Array
     momentum: Array
-    second_derivative: Array
+    momentum_rate: Array
     rest: Array
 
 
-def still(state: StateKind, *, pushed: bool) -> StateKind:
-    """State of a path that stands still, or sets off from there at a unit path acceleration."""
+def static_state(state: StateKind, *, accelerated: bool) -> StateKind:
+    """State of a path at path speed zero, with a path acceleration of zero or of one."""
     none = state.velocity * 0.0
-    changes = {"velocity": none, "acceleration": state.velocity if pushed else none}
+    changes = {"velocity": none, "acceleration": state.velocity if accelerated else none}
     if state.rotation is not None:
-        changes |= {"angular_velocity": none, "angular_acceleration": state.angular_velocity if pushed else none}
+        changes |= {"angular_velocity": none, "angular_acceleration": state.angular_velocity if accelerated else none}
     return state._replace(**changes)
 
 
 def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
-    """Parts of the wrench balance at one place."""
+    """Parts of the wrench balance at one point."""
     unit = wrench_units(robot)
-    rest = robot.inertial_wrench(still(state, pushed=False)) / unit
-    momentum = robot.inertial_wrench(still(state, pushed=True)) / unit - rest
-    second_derivative = robot.inertial_wrench(state) / unit - rest
-    return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, second_derivative, rest)
+    rest = robot.inertial_wrench(static_state(state, accelerated=False)) / unit
+    momentum = robot.inertial_wrench(static_state(state, accelerated=True)) / unit - rest
+    momentum_rate = robot.inertial_wrench(state) / unit - rest
+    return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, momentum_rate, rest)
 
 
-def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> Rows:
-    """Half-planes of one place."""
+def path_half_planes(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> HalfPlanes:
+    """Half-planes of one point."""
     parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
-    _, rate, second_derivative = cable_motion(robot, state)
+    _, rate, acceleration = cable_motion(robot, state)
     if limits.cable_acceleration_max is not None:
         maximum = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
-        both = (jnp.concatenate([side, -side]) for side in (rate, second_derivative))
+        both = (jnp.concatenate([side, -side]) for side in (rate, acceleration))
         parts.append((*both, *[jnp.concatenate([maximum, maximum])] * 2))
     if limits.cable_speed_max is not None:
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if limits.acceleration_max is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
-    u, x, most_of, size = (jnp.concatenate(column) for column in zip(*parts, strict=True))
-    return Rows(u, x, most_of, size, cap)
+    u, x, bounds, margin_loss = (jnp.concatenate(column) for column in zip(*parts, strict=True))
+    return HalfPlanes(u, x, bounds, margin_loss, cap)
 
 
 class TensionFaces(NamedTuple):
-    """Faces of the set of wrenches that the cables can give, by what they say of tensions t: along t >= least.
+    """Faces of the set of wrenches that the cables can give, by what they say of tensions t: along t >= minimum.
 
     Fields:
         along: (n_faces, n_cables) products of the normals, which point inside, with the cables.
-        least: (n_faces,) smallest products with tensions within their limits, N; -inf of a face that bounds nothing.
+        minimum: (n_faces,) smallest products with tensions within their limits, N; -inf of a face that bounds nothing.
     """
 
     along: Array
-    least: Array
+    minimum: Array
 
 
 def tension_faces(robot: AnyRobot, limits: Limits, matrix: Float[Array, "dof n_cables"]) -> TensionFaces:
-    """Faces at one place."""
+    """Faces at one point."""
     count, dof = robot.n_cables, robot.dof
     low, high = tension_range(robot, limits)
     is_beside = (beside_faces(count, dof)[..., None] == np.arange(count)).astype(float)
@@ -134,27 +137,25 @@ def tension_faces(robot: AnyRobot, limits: Limits, matrix: Float[Array, "dof n_c
 def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
     # One half-plane a face, over the weight.
     faces, weight = tension_faces(robot, limits, wrenches.matrix), robot.mass * robot.gravity
-    inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.least)
-    momentum, second_derivative, rest = (
-        jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:]
-    )
-    maximum = rest - jnp.where(bounds, faces.least, 0.0) / weight
-    size = jnp.sum(jnp.abs(faces.along), axis=1) / weight
+    inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.minimum)
+    momentum, momentum_rate, rest = (jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:])
+    maximum = rest - jnp.where(bounds, faces.minimum, 0.0) / weight
+    margin_loss = jnp.sum(jnp.abs(faces.along), axis=1) / weight
     # A face without a bound is 0 <= 1.
-    momentum, second_derivative, size = (jnp.where(bounds, x, 0.0) for x in (-momentum, -second_derivative, size))
-    return momentum, second_derivative, jnp.where(bounds, maximum, 1.0), size
+    momentum, momentum_rate, margin_loss = (jnp.where(bounds, x, 0.0) for x in (-momentum, -momentum_rate, margin_loss))
+    return momentum, momentum_rate, jnp.where(bounds, maximum, 1.0), margin_loss
 
 
 def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:
     """Directions in which the Cartesian acceleration is bounded, in the plane of p' and p''."""
     along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), TINY))
-    second_derivative = acceleration - jnp.dot(acceleration, along) * along
-    across = second_derivative / jnp.sqrt(jnp.maximum(jnp.sum(second_derivative**2), TINY))
+    normal = acceleration - jnp.dot(acceleration, along) * along
+    across = normal / jnp.sqrt(jnp.maximum(jnp.sum(normal**2), TINY))
     angles = np.linspace(0.0, np.pi, TANGENTS + 1)
     return np.cos(angles)[:, None] * along[None] + np.sin(angles)[:, None] * across[None]
 
 
-def _tangents(velocity: Array, acceleration: Array, most: Array) -> tuple[Array, ...]:
+def _tangents(velocity: Array, acceleration: Array, acceleration_max: Array) -> tuple[Array, ...]:
     directions = tangent_directions(velocity, acceleration)
-    bounds = most * jnp.ones(TANGENTS + 1)
+    bounds = acceleration_max * jnp.ones(TANGENTS + 1)
     return directions @ velocity, directions @ acceleration, bounds, bounds

@@ -3,7 +3,7 @@
 From the last cell to the first, K = {x : some u in the half-planes of the cell leads into the next K} is an interval
 (Pham and Pham 2018), where h(x) = beta(x) - alpha(x) >= 0: beta, the smallest upper bound of u, less alpha, the largest
 lower one, is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function, and end
-after a few; a slope that points away from zero proves that K is empty. So no linear program is solved.
+after a few; a derivative that points away from zero proves that K is empty. So no linear program is solved.
 
 Within a cell u changes at a constant rate that is chosen before; half-planes hold at both ends of each cell. Paths are
 the last axis of all arrays, and are solved together.
@@ -17,14 +17,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.families.paths.least_time.constraints import Rows
+from cspr_jax.families.paths.least_time.constraints import HalfPlanes
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# A half-plane whose share of u is smaller bounds x alone. Steps of Newton, at most.
+# A half-plane whose coefficient of u is smaller bounds x alone. Steps of Newton, at most.
 FLAT, STEPS = 1e-12, 40
 # Part of the numbers in it by which h may miss zero.
 CLOSE = 1e-13
@@ -34,28 +34,28 @@ class GridCells(NamedTuple):
     """Half-planes of n_cells cells of n_paths paths.
 
     Fields:
-        u: (n_cells, n_rows, n_paths) share of u in the middle of the cell.
+        u: (n_cells, n_rows, n_paths) coefficient of u in the middle of the cell.
         x: likewise, of x at its start.
-        most: likewise, bounds.
+        bound: likewise, bounds.
         width: (n_cells, n_paths) width of the cells, m.
         cap: (n_cells + 1, n_paths) largest x at the nodes, finite.
     """
 
     u: Array
     x: Array
-    most: Array
+    bound: Array
     width: Array
     cap: Array
 
 
-def _cells_of(sides: tuple[Rows, Rows], width: Array, second_derivative: Array, cap: Array) -> GridCells:
+def _cells_of(sides: tuple[HalfPlanes, HalfPlanes], width: Array, u_rate: Array, cap: Array) -> GridCells:
     # At the end of a cell x is that at its start and what u in the middle adds.
     start, end = sides
-    half = (0.5 * second_derivative * width)[:, None]
+    half = (0.5 * u_rate * width)[:, None]
     return GridCells(
         u=jnp.concatenate([start.u, end.u + 2.0 * width[:, None] * end.x], axis=1),
         x=jnp.concatenate([start.x, end.x], axis=1),
-        most=jnp.concatenate([start.most + start.u * half, end.most - end.u * half], axis=1),
+        bound=jnp.concatenate([start.bound + start.u * half, end.bound - end.u * half], axis=1),
         width=width,
         cap=cap,
     )
@@ -82,28 +82,28 @@ class GridSolution(NamedTuple):
 
 
 class _Bounds(NamedTuple):
-    # Bounds of u as lines in x, offset - slope x: from above, inf of half-planes that are none, and from below, -inf.
+    # Bounds of u as lines in x, offset - rate x: from above, inf of half-planes that are none, and from below, -inf.
     upper: Array
     lower: Array
-    slope: Array
-    size: Array
+    rate: Array
+    magnitude: Array
 
 
-def _bounds_of(u: Array, x_share: Array, most: Array) -> _Bounds:
+def _bounds_of(u: Array, x_coefficient: Array, bound: Array) -> _Bounds:
     over = jnp.where(jnp.abs(u) > FLAT, u, 1.0)
-    offset, slope = most / over, jnp.where(jnp.abs(u) > FLAT, x_share / over, 0.0)
+    offset, rate = bound / over, jnp.where(jnp.abs(u) > FLAT, x_coefficient / over, 0.0)
     upper, lower = jnp.where(u > FLAT, offset, jnp.inf), jnp.where(u < -FLAT, offset, -jnp.inf)
-    return _Bounds(upper, lower, slope, jnp.abs(offset))
+    return _Bounds(upper, lower, rate, jnp.abs(offset))
 
 
 def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
-    # h at x, its change with x, and the rounding in it. Reductions alone, since searches for places are slow.
-    upper, lower = bounds.upper - bounds.slope * x[None], bounds.lower - bounds.slope * x[None]
+    # h at x, its change with x, and the rounding in it. Reductions alone, since searches for indices are slow.
+    upper, lower = bounds.upper - bounds.rate * x[None], bounds.lower - bounds.rate * x[None]
     beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
-    falls = jnp.max(jnp.where(upper <= beta[None], bounds.slope, -jnp.inf), axis=0)
-    rises = jnp.min(jnp.where(lower >= alpha[None], bounds.slope, jnp.inf), axis=0)
-    size = jnp.abs(bounds.slope * x[None]) + bounds.size
-    largest = jnp.max(jnp.where((upper <= beta[None]) | (lower >= alpha[None]), size, 0.0), axis=0)
+    falls = jnp.max(jnp.where(upper <= beta[None], bounds.rate, -jnp.inf), axis=0)
+    rises = jnp.min(jnp.where(lower >= alpha[None], bounds.rate, jnp.inf), axis=0)
+    magnitude = jnp.abs(bounds.rate * x[None]) + bounds.magnitude
+    largest = jnp.max(jnp.where((upper <= beta[None]) | (lower >= alpha[None]), magnitude, 0.0), axis=0)
     return beta - alpha, rises - falls, CLOSE * largest
 
 
@@ -115,53 +115,53 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
 
     def follow(carry):
         x, is_outside, is_lost, step = carry
-        gap, slope, rounding = _gap(bounds, x)
+        gap, rate, rounding = _gap(bounds, x)
         is_outside &= ~(gap >= -rounding)
-        # A gap that is NaN, beyond an empty set, leads nowhere. The last x stays where no step leads on.
-        leads = (gap < 0.0) & (slope * sign < 0.0)
+        # A gap that is NaN, beyond an empty set, leads nowhere. The last x is kept where no step leads on.
+        leads = (gap < 0.0) & (rate * sign < 0.0)
         is_lost |= is_outside & ~leads
         is_outside &= leads
-        return jnp.where(is_outside, x - gap / jnp.where(leads, slope, 1.0), x), is_outside, is_lost, step + 1
+        return jnp.where(is_outside, x - gap / jnp.where(leads, rate, 1.0), x), is_outside, is_lost, step + 1
 
     is_number = jnp.isfinite(x)
     x, is_outside, is_lost, _ = lax.while_loop(is_open, follow, (x, is_number, ~is_number, 0))
     return jnp.where(is_outside | is_lost, jnp.nan, x)
 
 
-def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:
+def _flat_range(u: Array, x_coefficient: Array, bound: Array, cap: Array) -> tuple[Array, Array]:
     # Smallest and largest x by the half-planes that do not bound u, and by the cap; none: the largest is -1.
     is_flat = jnp.abs(u) <= FLAT
-    over = jnp.where(jnp.abs(x_share) > FLAT, x_share, 1.0)
-    high = jnp.min(jnp.where(is_flat & (x_share > FLAT), most / over, jnp.inf), axis=0)
-    low = jnp.max(jnp.where(is_flat & (x_share < -FLAT), most / over, 0.0), axis=0)
-    never = (is_flat & (jnp.abs(x_share) <= FLAT) & (most < 0.0)).any(0)
+    over = jnp.where(jnp.abs(x_coefficient) > FLAT, x_coefficient, 1.0)
+    high = jnp.min(jnp.where(is_flat & (x_coefficient > FLAT), bound / over, jnp.inf), axis=0)
+    low = jnp.max(jnp.where(is_flat & (x_coefficient < -FLAT), bound / over, 0.0), axis=0)
+    never = (is_flat & (jnp.abs(x_coefficient) <= FLAT) & (bound < 0.0)).any(0)
     return jnp.maximum(low, 0.0), jnp.where(never, -1.0, jnp.minimum(high, cap))
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
 def fastest(
-    sides: tuple[Rows, Rows],
+    sides: tuple[HalfPlanes, HalfPlanes],
     width: Float[Array, "n_cells n_paths"],
-    second_derivative: Float[Array, "n_cells n_paths"],
+    u_rate: Float[Array, "n_cells n_paths"],
     cap: Float[Array, "n_cells+1 n_paths"],
     ends: tuple[Float[Array, "n_paths"], Float[Array, "n_paths"]],
 ) -> GridSolution:
     """Fastest motions along paths."""
-    cells = _cells_of(sides, width, second_derivative, cap)
+    cells = _cells_of(sides, width, u_rate, cap)
     start, end = ends
 
-    def rows_of(cell: GridCells, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    def half_planes_of(cell: GridCells, low: Array, high: Array) -> tuple[Array, Array, Array]:
         # With the half-planes that lead into the next set.
         twice, one = 2.0 * cell.width, jnp.ones_like(cell.width)
         u = jnp.concatenate([cell.u, twice[None], -twice[None]])
         x = jnp.concatenate([cell.x, one[None], -one[None]])
-        return u, x, jnp.concatenate([cell.most, high[None], -low[None]])
+        return u, x, jnp.concatenate([cell.bound, high[None], -low[None]])
 
     def back(following, cell: GridCells):
         low, high, empty, index = following
-        rows = rows_of(cell, low, high)
-        floor, ceiling = _flat_range(*rows, cell.cap)
-        bounds = _bounds_of(*rows)
+        half_planes = half_planes_of(cell, low, high)
+        floor, ceiling = _flat_range(*half_planes, cell.cap)
+        bounds = _bounds_of(*half_planes)
         top = _edge(bounds, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
         bottom = _edge(bounds, floor, -1.0)
         is_empty = ~(bottom <= top)
@@ -182,8 +182,8 @@ def fastest(
 
     def ahead(x: Array, step):
         cell, low, high = step
-        bounds = _bounds_of(*rows_of(cell, low, high))
-        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.slope * x[None], axis=0), low, high)
+        bounds = _bounds_of(*half_planes_of(cell, low, high))
+        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.rate * x[None], axis=0), low, high)
         return after, (after, 0.5 * (after - x) / cell.width)
 
     beginning = jnp.clip(start, low[0], high[0])
@@ -191,11 +191,9 @@ def fastest(
     return GridSolution(low, high, jnp.concatenate([beginning[None], x]), u, empty, is_start)
 
 
-def smallest_of_slopes(
-    u: Float[np.ndarray, "n_cells"], width: Float[np.ndarray, "n_cells"]
-) -> Float[np.ndarray, "n_cells"]:
+def minmod_rates(u: Float[np.ndarray, "n_cells"], width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
     """Changes of u within cells: of the changes to both neighbours the smaller one, 0 where their signs differ."""
     steps = np.diff(u) / (0.5 * (width[1:] + width[:-1]))
     before, after = steps[:-1], steps[1:]
-    slopes = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
-    return np.concatenate([[0.0], slopes, [0.0]])
+    rates = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
+    return np.concatenate([[0.0], rates, [0.0]])

@@ -10,10 +10,10 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section, SectionSettings
-from cspr_jax.families.paths.least_time.constraints import Rows, face_count
-from cspr_jax.families.paths.least_time.multipliers import SideRows
-from cspr_jax.families.paths.least_time.nodes import PathGrid, grid_of, side_rows
-from cspr_jax.families.paths.least_time.smooth import NodeRows
+from cspr_jax.families.paths.least_time.constraints import HalfPlanes, face_count
+from cspr_jax.families.paths.least_time.multipliers import SideHalfPlanes
+from cspr_jax.families.paths.least_time.nodes import PathGrid, grid_of, side_half_planes
+from cspr_jax.families.paths.least_time.smooth import NodeHalfPlanes
 from cspr_jax.motion.problem import Problem
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Path speeds are taken to be no larger than so many times that of a fall along the path.
 FASTER = 1e2
-# Shares of x that differ by less at both sides of a node are the same.
+# Coefficients of x that differ by less at both sides of a node are the same.
 SAME = 1e-6
 
 
@@ -59,8 +59,8 @@ class Discrete:
 
     section: Section
     grid: PathGrid
-    start: Rows
-    end: Rows
+    start: HalfPlanes
+    end: HalfPlanes
     n_faces: int
     ends: tuple[float, float]
     largest: float
@@ -72,17 +72,20 @@ class Discrete:
 
     def can_rest(self) -> tuple[bool, bool]:
         """Tell whether tensions within their limits hold the effector at rest."""
-        first, last = ((rows.most[k] >= 0.0).all() for rows, k in ((self.start, 0), (self.end, -1)))
+        first, last = ((half_planes.bound[k] >= 0.0).all() for half_planes, k in ((self.start, 0), (self.end, -1)))
         return bool(first), bool(last)
 
     def with_margins(self, margins: GridMargins) -> "Discrete":
         """The same with tighter half-planes and caps."""
         nodes = margins.at_nodes()
-        shares = np.arange(self.start.most.shape[1]) < self.n_faces
+        is_tension = np.arange(self.start.bound.shape[1]) < self.n_faces
 
-        def tighter(rows: Rows, places: slice) -> Rows:
-            lost = np.where(shares, nodes.tension[places, None], nodes.acceleration[places, None])
-            return rows._replace(most=rows.most - rows.size * lost, cap=rows.cap * (1.0 - nodes.speed[places]) ** 2)
+        def tighter(half_planes: HalfPlanes, part: slice) -> HalfPlanes:
+            lost = np.where(is_tension, nodes.tension[part, None], nodes.acceleration[part, None])
+            return half_planes._replace(
+                bound=half_planes.bound - half_planes.margin_loss * lost,
+                cap=half_planes.cap * (1.0 - nodes.speed[part]) ** 2,
+            )
 
         first, last = tighter(self.start, slice(None, -1)), tighter(self.end, slice(1, None))
         return dataclasses.replace(self, start=first, end=last)
@@ -92,7 +95,7 @@ class Discrete:
         both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
         return np.minimum(np.minimum(*both), self.largest)
 
-    def node_rows(self) -> NodeRows:
+    def node_half_planes(self) -> NodeHalfPlanes:
         """Half-planes at the nodes; where those of both sides differ, all of them."""
         sides = [np.concatenate([s, e[-1:]]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
         jump = np.abs(self.start.x[1:] - self.end.x[:-1]).max(initial=0.0)
@@ -100,16 +103,16 @@ class Discrete:
             before = [np.concatenate([s[:1], e]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
             sides = [np.concatenate(pair) for pair in zip(sides, before, strict=True)]
         u, x, maximum = sides
-        return NodeRows(u, x, maximum, self.cap(), self.grid.width)
+        return NodeHalfPlanes(u, x, maximum, self.cap(), self.grid.width)
 
-    def dual_rows(self) -> SideRows:
+    def dual_half_planes(self) -> SideHalfPlanes:
         """Half-planes of the dual problem."""
         start, end = self.start, self.end
-        return SideRows(
+        return SideHalfPlanes(
             u=np.concatenate([start.u, end.u[-1:]]).T,
             before=np.concatenate([start.x[:1], end.x]).T,
             after=np.concatenate([start.x, end.x[-1:]]).T,
-            most=np.concatenate([start.most, end.most[-1:]]).T,
+            bound=np.concatenate([start.bound, end.bound[-1:]]).T,
             cap=np.minimum(0.5 * (start.cap + end.cap), self.largest),
             width=self.grid.width,
         )
@@ -123,11 +126,11 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
         grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), speed_max)
         for section, each in zip(sections, settings, strict=True)
     ]
-    sides = side_rows(robot, problem.limits, [section.curve for section in sections], grids)
+    sides = side_half_planes(robot, problem.limits, [section.curve for section in sections], grids)
     paths = []
     for section, each, grid, (start, end) in zip(sections, settings, grids, sides, strict=True):
         speeds = zip((each.start_speed, each.end_speed), _steepness(section.curve), strict=True)
-        first, last = ((speed / slope) ** 2 if speed else 0.0 for speed, slope in speeds)
+        first, last = ((speed / steepness) ** 2 if speed else 0.0 for speed, steepness in speeds)
         largest = FASTER**2 * float(robot.gravity) * float(section.curve.knots[-1])
         paths.append(Discrete(section, grid, start, end, face_count(robot), (first, last), largest))
     return paths

@@ -13,7 +13,7 @@ by parts, since u is half of the derivative of x along the path. The time is the
 
 The limits of cables' accelerations (a = l') and of the Cartesian one (a = p') are of the same form; a limit of speed
 adds a multiplier times what it leaves. The multipliers of `families.paths.least_time.multipliers` make the bound close;
-any others leave it true. Over each cell all functions lie in bands around lines (`numerics.bounds.affine_bounds`).
+any others leave it true. Over each cell all functions are Taylor models (`numerics.bounds.affine_bounds`).
 """
 
 import dataclasses
@@ -25,9 +25,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.paths.least_time.constraints import still, unit_wrenches
+from cspr_jax.families.paths.least_time.constraints import static_state, unit_wrenches
 from cspr_jax.families.paths.least_time.discrete import Discrete
-from cspr_jax.families.paths.least_time.nodes import Places, places_on, state_at
+from cspr_jax.families.paths.least_time.nodes import PathPoints, points_on, state_at
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, norm_squared, rotated, squared
 from cspr_jax.numerics.tolerances import ROUNDING
@@ -43,8 +43,9 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 BATCH = 64
 # Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
 SAFE = 1e-10
-# Times that multipliers are mended; cells on each side of one from which it takes what it lacks, and by how much more.
-REPAIRS, REACH, SPARE = 12, 20, 1.5
+# Times that multipliers are repaired; cells on each side of one from which it takes what it lacks, and by how much
+# more.
+REPAIRS, SPREAD, SPARE = 12, 20, 1.5
 # Axis of forces along gravity; by what more than is lacking weight is added.
 DOWN, MORE = 2, 1.01
 
@@ -54,13 +55,13 @@ class Multipliers(NamedTuple):
 
     Fields:
         wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
-        second_derivative: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
-        turn: (n_nodes, 3) of the Cartesian acceleration, likewise.
+        cable_acceleration: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
+        acceleration: (n_nodes, 3) of the Cartesian acceleration, likewise.
     """
 
     wrench: Any
-    second_derivative: Any
-    turn: Any
+    cable_acceleration: Any
+    acceleration: Any
 
 
 class SpeedMultipliers(NamedTuple):
@@ -81,7 +82,7 @@ class _Cell(NamedTuple):
     end: Multipliers
     rates: SpeedMultipliers
     width: Any
-    most: Any
+    speed: Any
 
 
 def lower_bound(
@@ -92,11 +93,13 @@ def lower_bound(
     states = curve.bounds(nodes[:-1], nodes[1:])
     width = np.diff(nodes)
     for _ in range(REPAIRS):
-        start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
+        start, end = (
+            Multipliers(*(values[side] for values in multipliers)) for side in (slice(None, -1), slice(1, None))
+        )
         cells = _Cell(start, end, rates, width, speed)
         gains, losses, lacks, short = in_batches(partial(_kernel, robot, limits), (states, cells), batch_size=BATCH)
         if (lacks > 0.0).any():
-            multipliers = _pulled_down(robot, multipliers, lacks)
+            multipliers = _with_weight(robot, multipliers, lacks)
             continue
         total = float(np.sum(gains) - np.sum(losses))
         if np.isfinite(total):
@@ -108,8 +111,8 @@ def lower_bound(
     return -np.inf
 
 
-def _pulled_down(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
-    # With a share of weight in y, no cable without a largest tension gains by pulling.
+def _with_weight(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
+    # With a part of weight in y, no product with a cable without a largest tension is positive.
     wrench = multipliers.wrench.copy()
     lacks = MORE * np.fmax(lacks, 0.0)
     wrench[:, PATTERNS[robot.pattern].forces.index(DOWN)] += np.fmax(np.append(lacks, 0.0), np.insert(lacks, 0, 0.0))
@@ -119,14 +122,14 @@ def _pulled_down(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -
 def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
     # [y . a x / 2], of all that is of the form of the wrench balance.
     total = 0.0
-    for place, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
+    for node, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
         if x > 0.0:
-            node = places_on(path.section.curve, path.grid.nodes[[place]], ahead=place == 0)
-            state = state_at(jax.tree.map(lambda leaf: leaf[0], node))
-            along = multipliers.wrench[place] @ unit_wrenches(robot, state).momentum
+            points = points_on(path.section.curve, path.grid.nodes[[node]], ahead=node == 0)
+            state = state_at(jax.tree.map(lambda x: x[0], points))
+            along = multipliers.wrench[node] @ unit_wrenches(robot, state).momentum
             along += (
-                multipliers.second_derivative[place] @ cable_motion(robot, state)[1]
-                + multipliers.turn[place] @ state.velocity
+                multipliers.cable_acceleration[node] @ cable_motion(robot, state)[1]
+                + multipliers.acceleration[node] @ state.velocity
             )
             total += 0.5 * sign * x * float(along)
     return total
@@ -137,11 +140,11 @@ def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np
     nodes = np.arange(len(short) + 1)
     fraction = np.zeros(len(nodes))
     for cell in np.flatnonzero(short > 0.0):
-        rise = np.clip(1.0 - (cell - nodes) / REACH, 0.0, 1.0) * (nodes <= cell)
-        fall = np.clip(1.0 - (nodes - cell - 1) / REACH, 0.0, 1.0) * (nodes > cell)
-        fraction += 0.5 * SPARE * short[cell] * (rise - fall)
+        rise = np.clip(1.0 - (cell - nodes) / SPREAD, 0.0, 1.0) * (nodes <= cell)
+        drop = np.clip(1.0 - (nodes - cell - 1) / SPREAD, 0.0, 1.0) * (nodes > cell)
+        fraction += 0.5 * SPARE * short[cell] * (rise - drop)
     momentum = in_batches(
-        partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), batch_size=BATCH
+        partial(_momentum, robot), (points_on(path.section.curve, path.grid.nodes, ahead=True),), batch_size=BATCH
     )
     square = np.sum(momentum**2, axis=1)
     change = np.where(square > 0.0, fraction / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
@@ -149,15 +152,15 @@ def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _momentum(robot: AnyRobot, nodes: tuple[Places]) -> Array:
-    return jax.vmap(lambda place: unit_wrenches(robot, state_at(place)).momentum)(*nodes)
+def _momentum(robot: AnyRobot, nodes: tuple[PathPoints]) -> Array:
+    return jax.vmap(lambda point: unit_wrenches(robot, state_at(point)).momentum)(*nodes)
 
 
 def _line(start: Array, end: Array) -> AffineBounds:
     return AffineBounds(0.5 * (start + end), 0.5 * (end - start), jnp.zeros_like(start))
 
 
-def _steep(start: Array, end: Array, width: Array) -> AffineBounds:
+def _line_rate(start: Array, end: Array, width: Array) -> AffineBounds:
     # The derivative of the line between both.
     change = (end - start) / width
     return AffineBounds(change, jnp.zeros_like(change), ROUNDING * jnp.abs(change))
@@ -169,11 +172,9 @@ def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
     return side - bounds.linear, side + bounds.linear
 
 
-def _along(
-    start: Array, end: Array, width: Array, momentum: AffineBounds, second_derivative: AffineBounds
-) -> AffineBounds:
+def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, rate: AffineBounds) -> AffineBounds:
     # y . a' - y' . a.
-    return dot(_line(start, end), second_derivative) - dot(_steep(start, end, width), momentum)
+    return dot(_line(start, end), rate) - dot(_line_rate(start, end, width), momentum)
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
@@ -184,19 +185,19 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
         if limits.cable_acceleration_max is not None:
-            ends = cell.start.second_derivative, cell.end.second_derivative
+            ends = cell.start.cable_acceleration, cell.end.cable_acceleration
             twice = twice + _along(*ends, cell.width, cables.rate, cables.acceleration)
             lost += jnp.sum(limits.cable_acceleration_max * 0.5 * (jnp.abs(ends[0]) + jnp.abs(ends[1])))
         if limits.acceleration_max is not None:
-            ends = cell.start.turn, cell.end.turn
+            ends = cell.start.acceleration, cell.end.acceleration
             twice = twice + _along(*ends, cell.width, state.velocity, state.acceleration)
             lost += limits.acceleration_max * 0.5 * (jnp.linalg.norm(ends[0]) + jnp.linalg.norm(ends[1]))
         if limits.cable_speed_max is not None:
             twice = twice + (2.0 * cell.rates.cable * squared(cables.rate)).total()
             lost += jnp.sum(jnp.square(limits.cable_speed_max) * cell.rates.cable)
-        rate = jnp.where(jnp.isfinite(cell.most), cell.rates.mass_centre, 0.0)
+        rate = jnp.where(jnp.isfinite(cell.speed), cell.rates.mass_centre, 0.0)
         twice = twice + 2.0 * rate * norm_squared(state.velocity)
-        lost += rate * jnp.square(jnp.where(jnp.isfinite(cell.most), cell.most, 0.0))
+        lost += rate * jnp.square(jnp.where(jnp.isfinite(cell.speed), cell.speed, 0.0))
         # A concave function of a line is above the line between its values at both ends.
         low, high = _ends(twice, -1.0)
         values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
@@ -209,42 +210,45 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
 def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array, Array]:
     # y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and what y lacks of weight.
     unit = 1.0 / wrench_units(robot)
-    rest, pushed = still(state, pushed=False), still(state, pushed=True)
+    rest, accelerated = static_state(state, accelerated=False), static_state(state, accelerated=True)
     cables = cable_bounds(robot, rest)
     matrix, weight = balance_bounds(robot, rest, cables)
-    momentum = balance_bounds(robot, pushed, cables)[1] - weight
-    second_derivative = balance_bounds(robot, state, cables)[1] - weight
-    matrix, weight, momentum, second_derivative = (
+    momentum = balance_bounds(robot, accelerated, cables)[1] - weight
+    momentum_rate = balance_bounds(robot, state, cables)[1] - weight
+    matrix, weight, momentum, momentum_rate = (
         matrix * unit[:, None],
         weight * unit,
         momentum * unit,
-        second_derivative * unit,
+        momentum_rate * unit,
     )
     ends = cell.start.wrench, cell.end.wrench
     line = _line(*ends)
-    pulls = rotated(matrix.each(jnp.transpose), line)
+    products = rotated(matrix.each(jnp.transpose), line)
     low, high = tension_range(robot, limits)
     is_bounded = jnp.isfinite(high)
 
-    def most(value: Array) -> Array:
+    def support_of(value: Array) -> Array:
         return jnp.where(value > 0.0, value * jnp.where(is_bounded, high, 0.0), value * low)
 
     # A convex function of a line is below the line between its values at both ends.
-    sides = [jnp.maximum(most(up), most(down)) for up, down in zip(_ends(pulls, 1.0), _ends(pulls, -1.0), strict=True)]
+    sides = [
+        jnp.maximum(support_of(up), support_of(down))
+        for up, down in zip(_ends(products, 1.0), _ends(products, -1.0), strict=True)
+    ]
     support = 0.5 * jnp.sum(sides[0] + sides[1])
     held = dot(line, weight)
     lack = jnp.zeros(())
     if DOWN in PATTERNS[robot.pattern].forces:
         upward = -matrix.high()[PATTERNS[robot.pattern].forces.index(DOWN)]
-        gains = jnp.where(is_bounded, 0.0, pulls.high())
+        gains = jnp.where(is_bounded, 0.0, products.high())
         lack = jnp.max(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
     if PATTERNS[robot.pattern].along_line:
-        second_derivative = second_derivative - _turning_axes(robot, pushed, cables) * unit
-    return _along(*ends, cell.width, momentum, second_derivative), support - (held.middle - held.radius), lack
+        momentum_rate = momentum_rate - _turning_axes(robot, accelerated, cables) * unit
+    return _along(*ends, cell.width, momentum, momentum_rate), support - (held.middle - held.radius), lack
 
 
-def _turning_axes(robot: Any, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
+def _turning_axes(robot: Any, accelerated: StateBounds, cables: CableBounds) -> AffineBounds:
     # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
-    full = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
-    moment = cross(full, pushed.angular_acceleration).each(lambda x: x[:, None])
-    return balanced_part(robot, pushed.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])
+    full = balance_bounds(dataclasses.replace(robot, pattern=RIGID), accelerated, cables)[1].each(lambda x: x[3:])
+    moment = cross(full, accelerated.angular_acceleration).each(lambda x: x[:, None])
+    return balanced_part(robot, accelerated.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

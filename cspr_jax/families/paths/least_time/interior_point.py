@@ -1,6 +1,6 @@
 """Interior-point method for a convex objective with many linear constraints, whose matrix its problem solves itself.
 
-A primal-dual method that needs no feasible start: slacks and pressures (multipliers) of all constraints stay positive,
+A primal-dual method that needs no feasible start: slacks and multipliers of all constraints stay positive,
 and the products of both fall together (Mehrotra 1992).
 """
 
@@ -8,9 +8,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-# Steps at most; part of the objective by which the optimum may be missed; part of the way to a bound that a step goes;
-# part of the mean product of slacks and pressures at which each step aims.
-STEPS, GAP, SHARE, AIM = 120, 1e-7, 0.99, 0.1
+# Steps at most; part of the objective by which the optimum may be missed; part of the distance to a bound that a step
+# goes; part of the mean product of slacks and multipliers at which each step aims.
+STEPS, GAP, FRACTION, AIM = 120, 1e-7, 0.99, 0.1
 # By how much constraints and equations may be missed, in their scales.
 MISSED, LEVEL = 1e-9, 1e-6
 
@@ -40,8 +40,8 @@ class Constrained(Protocol):
             multipliers: (m,).
         """
 
-    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Gradient of minus the slacks times pressures, as `z`.
+    def jt_multipliers(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Transposed Jacobian of minus the slacks, times multipliers, as `z`.
 
         Args:
             z: unknowns.
@@ -88,12 +88,12 @@ class Optimum(NamedTuple):
 
 
 def _length(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
-    # Longest step, up to 1, by which no value loses more than a share of itself.
-    shares = [1.0]
+    # Longest step, up to 1, by which no value loses more than a fraction of itself.
+    lengths = [1.0]
     for value, change in pairs:
         falling = change < 0.0
-        shares.append(SHARE * float(np.min(-value[falling] / change[falling], initial=np.inf)))
-    return min(shares)
+        lengths.append(FRACTION * float(np.min(-value[falling] / change[falling], initial=np.inf)))
+    return min(lengths)
 
 
 def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
@@ -109,17 +109,17 @@ def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
         if is_met and complement < GAP * problem.value(z):
             return Optimum(z, multipliers, True)
         target, weights = AIM * complement / len(slacks), multipliers / slacks
-        push = target / slacks - multipliers + weights * missed
+        change = target / slacks - multipliers + weights * missed
         try:
-            step = problem.solved(z, weights, -residual - problem.pushed(z, push))
+            step = problem.solved(z, weights, -residual - problem.jt_multipliers(z, change))
         except np.linalg.LinAlgError:  # of cells whose widths differ beyond all digits
             break
         slack_step = problem.change(z, step) - missed
-        pressure_step = target / slacks - multipliers - weights * slack_step
+        multiplier_step = target / slacks - multipliers - weights * slack_step
         primal = _length([(slacks, slack_step), (problem.positive(z), problem.positive(step))])
-        dual = _length([(multipliers, pressure_step)])
+        dual = _length([(multipliers, multiplier_step)])
         if not np.isfinite(primal * dual) or not np.isfinite(step).all():
             break
         z = z + primal * step
-        slacks, multipliers = slacks + primal * slack_step, multipliers + dual * pressure_step
+        slacks, multipliers = slacks + primal * slack_step, multipliers + dual * multiplier_step
     return Optimum(z, multipliers, False)

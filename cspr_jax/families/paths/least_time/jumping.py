@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.families.paths.least_time.controllable import GridSolution, fastest, smallest_of_slopes
+from cspr_jax.families.paths.least_time.controllable import GridSolution, fastest, minmod_rates
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
 from cspr_jax.numerics.batches import device_batch_size, padded
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
-TOGETHER, BENT = 32, 2
-# Width of a cell over that of all below which u changes within it as it is known to.
+TOGETHER, REPEATS = 32, 2
+# Width of a cell over that of all below which u changes within it as is given.
 NARROW = 0.5
 
 
-class PathPace(NamedTuple):
-    """PathPace of a feasible motion along a section, near which a faster one is sought where it is hard to find.
+class PathAccelerations(NamedTuple):
+    """Path accelerations of a feasible motion along a section, near which a faster one is sought if it is hard to find.
 
     Fields:
         coordinate: (k,) s, increasing, m.
@@ -34,7 +34,7 @@ class PathPace(NamedTuple):
     coordinate: np.ndarray
     acceleration: np.ndarray
 
-    def second_derivative(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
+    def u_rate(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
         """Changes of the path acceleration within cells, over their widths."""
         return np.diff(np.interp(nodes, *self)) / np.diff(nodes)
 
@@ -44,75 +44,73 @@ class Jumping(NamedTuple):
 
     Fields:
         run: path speeds and accelerations; None if there is no motion.
-        second_derivative: (n_cells,) change of u along each cell, over its width.
+        u_rate: (n_cells,) change of u along each cell, over its width.
         first: solution with u constant in each cell.
     """
 
     run: PathSpeeds | None
-    second_derivative: np.ndarray
+    u_rate: np.ndarray
     first: GridSolution
 
 
-def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[GridSolution]:
+def solved_together(paths: Sequence[Discrete], u_rates: Sequence[np.ndarray]) -> list[GridSolution]:
     """Solutions on the grids of sections."""
     solutions: dict[int, GridSolution] = {}
     groups = defaultdict(list)
     for k, path in enumerate(paths):
         groups[path.start.u.shape].append(k)
     for members in groups.values():
-        size = device_batch_size(TOGETHER)
-        for first in range(0, len(members), size):
-            chosen = members[first : first + size]
+        count = device_batch_size(TOGETHER)
+        for first in range(0, len(members), count):
+            chosen = members[first : first + count]
             columns = [
-                ((p.start, p.end), p.grid.width, bends[k], p.cap(), tuple(np.asarray(x) for x in p.ends))
+                ((p.start, p.end), p.grid.width, u_rates[k], p.cap(), tuple(np.asarray(x) for x in p.ends))
                 for k, p in ((k, paths[k]) for k in chosen)
             ]
-            rows = jax.tree.map(lambda *leaves: np.stack(leaves), *columns)
-            rows = rows if len(chosen) == 1 else padded(rows, size)
-            answer = fastest(*jax.tree.map(lambda leaf: np.moveaxis(leaf, 0, -1), rows))
+            stacked = jax.tree.map(lambda *x: np.stack(x), *columns)
+            stacked = stacked if len(chosen) == 1 else padded(stacked, count)
+            answer = fastest(*jax.tree.map(lambda x: np.moveaxis(x, 0, -1), stacked))
             answer = jax.tree.map(np.asarray, answer)
             for i, k in enumerate(chosen):
-                solutions[k] = jax.tree.map(lambda leaf, i=i: leaf[..., i], answer)
+                solutions[k] = jax.tree.map(lambda x, i=i: x[..., i], answer)
     return [solutions[k] for k in range(len(paths))]
 
 
-def run_of(
-    solution: GridSolution, path: Discrete, second_derivative: Float[np.ndarray, "n_cells"]
-) -> PathSpeeds | None:
+def run_of(solution: GridSolution, path: Discrete, u_rate: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
     """Path speeds and accelerations of a solution."""
     if not _is_passable(solution):
         return None
-    half = 0.5 * second_derivative * path.grid.width
+    half = 0.5 * u_rate * path.grid.width
     u = np.asarray(solution.u)
     return moving(PathSpeeds(np.asarray(solution.x), u - half, u + half), path.grid.width)
 
 
-def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] = ()) -> list[Jumping]:
+def jumping_motions(paths: Sequence[Discrete], guesses: Sequence[PathAccelerations | None] = ()) -> list[Jumping]:
     """The fastest motions along sections.
 
     Within cells u changes as it does from cell to cell, where there is a motion that does.
     """
-    bends = [np.zeros_like(path.grid.width) for path in paths]
-    solutions = solved_together(paths, bends)
-    known = {
-        k: pace.second_derivative(paths[k].grid.nodes)
-        for k, pace in enumerate(paces)
-        if pace is not None and not _is_passable(solutions[k])
+    u_rates = [np.zeros_like(path.grid.width) for path in paths]
+    solutions = solved_together(paths, u_rates)
+    given = {
+        k: guess.u_rate(paths[k].grid.nodes)
+        for k, guess in enumerate(guesses)
+        if guess is not None and not _is_passable(solutions[k])
     }
-    for k, solution in zip(known, solved_together([paths[k] for k in known], list(known.values())), strict=True):
-        solutions[k], bends[k] = solution, known[k]
+    for k, solution in zip(given, solved_together([paths[k] for k in given], list(given.values())), strict=True):
+        solutions[k], u_rates[k] = solution, given[k]
     motions = [
-        Jumping(run_of(solution, path, second_derivative), second_derivative, solution)
-        for solution, path, second_derivative in zip(solutions, paths, bends, strict=True)
+        Jumping(run_of(solution, path, u_rate), u_rate, solution)
+        for solution, path, u_rate in zip(solutions, paths, u_rates, strict=True)
     ]
     going = [k for k, motion in enumerate(motions) if motion.run is not None]
-    for _ in range(BENT):
-        changes = [_changes(solutions[k], paths[k].grid.width, known.get(k)) for k in going]
+    for _ in range(REPEATS):
+        changes = [_changes(solutions[k], paths[k].grid.width, given.get(k)) for k in going]
         following = solved_together([paths[k] for k in going], changes)
         better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
         for k, solution, change, run in zip(going, following, changes, better, strict=True):
             if run is not None:
-                solutions[k], motions[k] = solution, motions[k]._replace(run=run, second_derivative=change)
+                solutions[k], motions[k] = solution, motions[k]._replace(run=run, u_rate=change)
         going = [k for k, run in zip(going, better, strict=True) if run is not None]
     return motions
 
@@ -121,13 +119,13 @@ def _is_passable(solution: GridSolution) -> bool:
     return bool(solution.empty < 0 and solution.is_start)
 
 
-def _changes(solution: GridSolution, width: np.ndarray, known: np.ndarray | None) -> np.ndarray:
-    # In cells that are narrow since the path all but turns back there, u changes as it is known to.
-    change = smallest_of_slopes(np.asarray(solution.u), width)
-    return change if known is None else np.where(width < NARROW * width.mean(), known, change)
+def _changes(solution: GridSolution, width: np.ndarray, given: np.ndarray | None) -> np.ndarray:
+    # In cells that are narrow since the path all but turns back there, u changes as is given.
+    change = minmod_rates(np.asarray(solution.u), width)
+    return change if given is None else np.where(width < NARROW * width.mean(), given, change)
 
 
-def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[PathSpeeds | None]:
-    """The fastest motions with changes of u within cells that are known."""
-    solutions = solved_together(paths, bends)
-    return [run_of(*case) for case in zip(solutions, paths, bends, strict=True)]
+def again(paths: Sequence[Discrete], u_rates: Sequence[np.ndarray]) -> list[PathSpeeds | None]:
+    """The fastest motions with given changes of u within cells."""
+    solutions = solved_together(paths, u_rates)
+    return [run_of(*case) for case in zip(solutions, paths, u_rates, strict=True)]

@@ -12,7 +12,7 @@ from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.bound import path_bound
 from cspr_jax.families.paths.least_time.controllable import GridSolution
 from cspr_jax.families.paths.least_time.discrete import FASTER, Discrete, discretes
-from cspr_jax.families.paths.least_time.jumping import Jumping, PathPace, again, jumping_motions
+from cspr_jax.families.paths.least_time.jumping import Jumping, PathAccelerations, again, jumping_motions
 from cspr_jax.families.paths.least_time.refusals import NoMotion, refusal
 from cspr_jax.families.paths.least_time.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.families.paths.least_time.tightening import BindingName, CellSlacks, Trial, together
@@ -27,8 +27,8 @@ ROUNDS, SHORTER = 8, 4
 SLOW = 0.01
 # How many times as fine grids are for motions that are not proved, and for lower bounds that are further below the
 # duration than this part of it.
-FINER, APART = (2, 4), 0.002
-# Shares of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
+FINER, FAR = (2, 4), 0.002
+# Fractions of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
 # at the one before.
 STARTS, TANGENTS = (0.8, 0.4), 3
 # Sections that are solved together.
@@ -62,7 +62,7 @@ class LeastTime:
         coordinate: (n_nodes,) s at these knots, m.
         duration: of it, s.
         lower_bound: rigorous lower bound of the time of any motion that goes forward along the section, s; NaN where
-            none is known.
+            none is proved.
         jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
         ramp_time: of the motion, s; 0 where its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.
@@ -88,20 +88,20 @@ class LeastTime:
 
 
 def least_time_motion(
-    problem: Problem, section: Section, settings: SectionSettings, pace: PathPace | None = None
+    problem: Problem, section: Section, settings: SectionSettings, guess: PathAccelerations | None = None
 ) -> LeastTime:
     """Find the fastest motion along a section."""
-    return least_time_motions(problem, [section], [settings], [pace])[0]
+    return least_time_motions(problem, [section], [settings], [guess])[0]
 
 
 def least_times_along(
     problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
 ) -> Iterator[LeastTime]:
     """Find the fastest motions along sections, however many, and announce how far that is."""
-    count, pace = len(sections), RateEstimate()
+    count, progress = len(sections), RateEstimate()
     for first in range(0, count, batch):
-        pace.advance(first, count)
-        part, left = slice(first, first + batch), pace.left()
+        progress.advance(first, count)
+        part, left = slice(first, first + batch), progress.left()
         with within(f"least time, section {first + 1} of {count}" + f", {left}" * bool(left)):
             motions = least_time_motions(problem, sections[part], settings[part])
         yield from motions
@@ -111,22 +111,22 @@ def least_time_motions(
     problem: Problem,
     sections: Sequence[Section],
     settings: Sequence[SectionSettings],
-    paces: Sequence[PathPace | None] = (),
+    guesses: Sequence[PathAccelerations | None] = (),
 ) -> list[LeastTime]:
     """Find the fastest motions along sections."""
     paths = discretes(problem, sections, settings)
-    paces = paces or [None] * len(sections)
-    cases = zip(paths, jumping_motions(paths, paces), settings, strict=True)
+    guesses = guesses or [None] * len(sections)
+    cases = zip(paths, jumping_motions(paths, guesses), settings, strict=True)
     answers = together(problem, [_proved(problem, *case) for case in cases])
     for finer in FINER:
         # A motion that is not proved on its grid, or not found, may be on a finer one.
-        rows = [k for k, (_, is_met) in enumerate(answers) if not is_met]
-        if not rows:
+        unmet = [k for k, (_, is_met) in enumerate(answers) if not is_met]
+        if not unmet:
             break
-        closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]
-        paths = discretes(problem, [sections[k] for k in rows], closer)
-        cases = zip(paths, jumping_motions(paths, [paces[k] for k in rows]), closer, strict=True)
-        for k, answer in zip(rows, together(problem, [_proved(problem, *case) for case in cases]), strict=True):
+        closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in unmet]
+        paths = discretes(problem, [sections[k] for k in unmet], closer)
+        cases = zip(paths, jumping_motions(paths, [guesses[k] for k in unmet]), closer, strict=True)
+        for k, answer in zip(unmet, together(problem, [_proved(problem, *case) for case in cases]), strict=True):
             answers[k] = answer
     return [answer for answer, _ in answers]
 
@@ -136,7 +136,7 @@ def _proved(
 ) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
     # and receives the bounds of their slacks.
-    jumping, second_derivative, first = start
+    jumping, u_rate, first = start
     if jumping is None:
         return _without_motion(problem, path, first), False
     section = path.section
@@ -152,7 +152,7 @@ def _proved(
         motion = timed(section, path.grid, run)
         slacks = yield Trial(motion, path.grid.feed)
         margins = slacks.grown(margins, weight)
-        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, second_derivative, jerk)
+        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, u_rate, jerk)
     times = np.diff(np.asarray(motion.knots))
     speed = np.sqrt(run.x)
     names, binds = slacks.binding(path.grid.feed, section.feeds)
@@ -177,7 +177,7 @@ def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.nd
     # From finer grids where the lower bound is not close to the duration.
     bound = path_bound(problem, path, x)
     for finer in FINER:
-        if bound >= (1.0 - APART) * duration:
+        if bound >= (1.0 - FAR) * duration:
             break
         other = discretes(problem, [path.section], [settings._replace(grid=finer * settings.grid)])[0]
         bound = max(bound, path_bound(problem, other, np.interp(other.grid.nodes, path.grid.nodes, x)))
@@ -235,7 +235,7 @@ def _ramped(path: Discrete, jumping: PathSpeeds, ramp_time: float) -> tuple[Path
 
 
 def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, times: int) -> PathSpeeds | None:
-    motion = smooth(path.node_rows(), ends, start, jerk, times)
+    motion = smooth(path.node_half_planes(), ends, start, jerk, times)
     return (
         None
         if motion is None
@@ -243,9 +243,9 @@ def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, tim
     )
 
 
-def _slower(path: Discrete, run: PathSpeeds, second_derivative: np.ndarray, jerk: float) -> PathSpeeds | None:
+def _slower(path: Discrete, run: PathSpeeds, u_rate: np.ndarray, jerk: float) -> PathSpeeds | None:
     # The fastest motion within tighter limits.
     if not np.isfinite(jerk):
-        return again([path], [second_derivative])[0]
+        return again([path], [u_rate])[0]
     start = Smooth(run.x, np.append(run.before, run.after[-1]))
     return _smoothed(path, start, SectionEnds(path.ends, run.rests), jerk, 1)

@@ -18,18 +18,21 @@ from cspr_jax.families.paths.least_time.interior_point import interior_point
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Shares of the x of a motion from which the search begins, one after the other: next to limits it may come to a halt.
+# Fractions of the x of a motion from which the search begins, one after the other: next to limits it may come to a
+# halt.
 STARTS = (0.8, 0.4, 1.0)
 
 
-class SideRows(NamedTuple):
-    """Half-planes at the nodes, of both sides where they differ: u_share u + x_share x <= most, and caps of the cells.
+class SideHalfPlanes(NamedTuple):
+    """Half-planes at the nodes, u_coefficient u + x_coefficient x <= bound, and caps of the cells.
+
+    Where both sides of a node differ, those of both are there.
 
     Fields:
         u: (n_rows, n_nodes).
-        before: (n_rows, n_nodes) share of x at the end of the cell before.
+        before: (n_rows, n_nodes) coefficient of x at the end of the cell before.
         after: likewise, at the start of the cell after.
-        most: (n_rows, n_nodes).
+        bound: (n_rows, n_nodes).
         cap: (n_nodes - 1,) largest x.
         width: (n_nodes - 1,) m.
     """
@@ -37,38 +40,41 @@ class SideRows(NamedTuple):
     u: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    most: np.ndarray
+    bound: np.ndarray
     cap: np.ndarray
     width: np.ndarray
 
 
 def dual_multipliers(
-    rows: SideRows, ends: tuple[float, float], start: Float[np.ndarray, "n_nodes-1"]
+    half_planes: SideHalfPlanes, ends: tuple[float, float], start: Float[np.ndarray, "n_nodes-1"]
 ) -> tuple[Float[np.ndarray, "n_rows n_nodes"], Float[np.ndarray, "n_nodes-1"]]:
     """Multipliers of the half-planes, and of the caps."""
-    problem = _Staggered(rows, ends)
+    problem = _Staggered(half_planes, ends)
     for fraction in STARTS:
         optimum = interior_point(problem, fraction * start)
         if optimum.is_optimal:
             break
     of_nodes, of_cells = problem.parts(optimum.multipliers)
-    return of_nodes / problem.weights, of_cells / (rows.cap * rows.width)
+    return of_nodes / problem.weights, of_cells / (half_planes.cap * half_planes.width)
 
 
 class _Staggered:
-    # Constraints at nodes are of the x before and after: before x0 + after x1 <= most; those of cells x / cap <= 1.
-    def __init__(self, rows: SideRows, ends: tuple[float, float]) -> None:
-        self.width, self.cap = rows.width, rows.cap
+    # Constraints at nodes are of the x before and after: before x0 + after x1 <= bound; those of cells x / cap <= 1.
+    def __init__(self, half_planes: SideHalfPlanes, ends: tuple[float, float]) -> None:
+        self.width, self.cap = half_planes.width, half_planes.cap
         sides = np.concatenate([[0.0], self.width]), np.concatenate([self.width, [0.0]])
         both = sides[0] + sides[1]
         self.weights = 0.5 * both
-        self.before, self.after = (-rows.u + rows.before * sides[0]) / both, (rows.u + rows.after * sides[1]) / both
-        self.most = rows.most.copy()
-        self.most[:, 0] += rows.u[:, 0] * ends[0] / self.width[0]
-        self.most[:, -1] -= rows.u[:, -1] * ends[1] / self.width[-1]
+        self.before, self.after = (
+            (-half_planes.u + half_planes.before * sides[0]) / both,
+            (half_planes.u + half_planes.after * sides[1]) / both,
+        )
+        self.bound = half_planes.bound.copy()
+        self.bound[:, 0] += half_planes.u[:, 0] * ends[0] / self.width[0]
+        self.bound[:, -1] -= half_planes.u[:, -1] * ends[1] / self.width[-1]
 
     def parts(self, constraints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return constraints[: self.most.size].reshape(self.most.shape), constraints[self.most.size :]
+        return constraints[: self.bound.size].reshape(self.bound.shape), constraints[self.bound.size :]
 
     def value(self, z: np.ndarray) -> float:
         return float(np.sum(self.width / np.sqrt(z)))
@@ -77,25 +83,25 @@ class _Staggered:
         return z
 
     def slacks(self, z: np.ndarray) -> np.ndarray:
-        return np.append(self.most, np.ones_like(z)) + self.change(z, z)
+        return np.append(self.bound, np.ones_like(z)) + self.change(z, z)
 
     def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        total = np.zeros_like(self.most)
+        total = np.zeros_like(self.bound)
         total[:, 1:] -= self.before[:, 1:] * step
         total[:, :-1] -= self.after[:, :-1] * step
         return np.append(total, -step / self.cap)
 
-    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        rows, caps = self.parts(multipliers)
-        return np.sum((self.before * rows)[:, 1:] + (self.after * rows)[:, :-1], axis=0) + caps / self.cap
+    def jt_multipliers(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        of_nodes, caps = self.parts(multipliers)
+        return np.sum((self.before * of_nodes)[:, 1:] + (self.after * of_nodes)[:, :-1], axis=0) + caps / self.cap
 
     def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        return self.pushed(z, multipliers) - 0.5 * self.width * z**-1.5
+        return self.jt_multipliers(z, multipliers) - 0.5 * self.width * z**-1.5
 
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
-        rows, caps = self.parts(weights)
-        bands = np.zeros((2, len(z)))
-        bands[1] = 0.75 * self.width * z**-2.5 + caps / self.cap**2
-        bands[1] += np.sum((rows * self.before**2)[:, 1:] + (rows * self.after**2)[:, :-1], axis=0)
-        bands[0, 1:] = np.sum((rows * self.before * self.after)[:, 1:-1], axis=0)
-        return solveh_banded(bands, right, check_finite=False)
+        of_nodes, caps = self.parts(weights)
+        banded = np.zeros((2, len(z)))
+        banded[1] = 0.75 * self.width * z**-2.5 + caps / self.cap**2
+        banded[1] += np.sum((of_nodes * self.before**2)[:, 1:] + (of_nodes * self.after**2)[:, :-1], axis=0)
+        banded[0, 1:] = np.sum((of_nodes * self.before * self.after)[:, 1:-1], axis=0)
+        return solveh_banded(banded, right, check_finite=False)

@@ -1,29 +1,74 @@
-"""Why no motion runs along a section: the place that no path speed passes, or the end whose speed is not possible."""
+"""Why no motion runs along a section: the point that no path speed passes, or the end whose speed is not possible."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import numpy as np
 from scipy.optimize import linprog
 
-from cspr_jax.families.paths.least_time.constraint_names import RowName, row_names
+from cspr_jax.families.paths.least_time.constraints import TANGENTS, face_count, unit_wrenches
 from cspr_jax.families.paths.least_time.controllable import FLAT, GridSolution
 from cspr_jax.families.paths.least_time.discrete import Discrete
-from cspr_jax.families.paths.least_time.nodes import places_on, state_at
+from cspr_jax.families.paths.least_time.nodes import points_on, state_at
 from cspr_jax.families.paths.least_time.static_tension import StaticTension, static_tension
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.wrench_sets import spanning
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import Verdict
 
-# Names of what no half-plane of a place is: speeds from which the rest of the path can be run along.
-WAY_ON = None
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+FLAGS = {row.name: row.flag for row in LIMITS}
+# Flag of a criterion, and its cable from 0 on, or None.
+HalfPlaneName = tuple[Verdict, int | None]
+
+
+def half_plane_names(
+    problem: Problem, state: State, u: Float[np.ndarray, "n_rows"], x: Float[np.ndarray, "n_rows"]
+) -> list[HalfPlaneName]:
+    """Names of the half-planes of one point, in the order of `constraints.path_half_planes`."""
+    robot, limits = problem.robot, problem.limits
+    names = _of_faces(problem, state, np.stack([u, x], axis=1))
+    if limits.cable_acceleration_max is not None:
+        names += [(Verdict.CABLE_OVER_ACCELERATION, k) for k in range(robot.n_cables)] * 2
+    if getattr(limits, "acceleration_max", None) is not None:
+        names += [(FLAGS["acceleration_max"], None)] * (TANGENTS + 1)
+    return names
+
+
+def _of_faces(problem: Problem, state: State, coefficients: np.ndarray) -> list[HalfPlaneName]:
+    # On as many cables as degrees of freedom all cables but one span a face, on which the tension of that one is the
+    # smallest where the half-plane has it with the other sign, else the largest.
+    robot = problem.robot
+    count = face_count(robot)
+    if robot.n_cables > robot.dof:
+        return [(Verdict.WRENCH_INFEASIBLE, None)] * count
+    parts = unit_wrenches(robot, state)
+    tensions = np.linalg.solve(parts.matrix, np.stack([parts.momentum, parts.momentum_rate], axis=1))
+    beside = [set(range(robot.n_cables)) - set(chosen) for chosen in spanning(robot.n_cables, robot.dof).tolist()]
+    cables = [cable for others in beside for cable in others] * 2
+    is_smallest = [tensions[cable] @ fraction < 0.0 for cable, fraction in zip(cables, coefficients, strict=False)]
+    return [
+        (Verdict.SLACK_CABLE if minimum else Verdict.OVER_TENSION, cable)
+        for minimum, cable in zip(is_smallest, cables, strict=True)
+    ]
+
+
+# Name of what is no half-plane of a point: speeds from which the rest of the path can be run along.
+REST_OF_PATH = None
 
 
 class NoMotion(NamedTuple):
     """Why a section cannot be run along.
 
     Fields:
-        coordinate: s of the place at which it fails, m.
-        position: (3,) the place, in the axes of the kernels, m.
+        coordinate: s of the point at which it fails, m.
+        position: (3,) the point, in the axes of the kernels, m.
         names: what needs a path acceleration there, and what forbids it: flags and cables; None for the speeds from
             which the rest of the path can be run along; () where the speed at an end is refused.
         needed: this acceleration, m/s^2; at an end the speed that is refused, m/s.
@@ -36,7 +81,7 @@ class NoMotion(NamedTuple):
 
     coordinate: float
     position: np.ndarray
-    names: tuple[RowName | None, ...]
+    names: tuple[HalfPlaneName | None, ...]
     needed: float
     allowed: float
     end: str = ""
@@ -51,42 +96,42 @@ def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotio
     state = _state(path, node)
     position = np.asarray(state.position)
     # A body that turns on the spot has no acceleration along its path in m/s^2.
-    slope, coordinate = float(np.linalg.norm(state.velocity)) or np.nan, float(path.grid.nodes[node])
+    scale, coordinate = float(np.linalg.norm(state.velocity)) or np.nan, float(path.grid.nodes[node])
     static = _static_tension(problem, path, node)
     if 0 <= cell < n_cells:
-        needed, allowed, rows = _meeting(path, solution, cell)
-        known = row_names(problem, state, *(np.asarray(fraction[cell]) for fraction in path.start[:2]))
+        needed, allowed, indices = _contradiction(path, solution, cell)
+        half_planes = half_plane_names(problem, state, *(np.asarray(fraction[cell]) for fraction in path.start[:2]))
         # Half-planes of both ends of a cell follow each other; those beyond lead into the next set.
-        names = tuple(known[row % len(known)] if row < 2 * len(known) else WAY_ON for row in rows)
-        return NoMotion(coordinate, position, names, slope * needed, slope * allowed, static_tension=static)
+        names = tuple(half_planes[k % len(half_planes)] if k < 2 * len(half_planes) else REST_OF_PATH for k in indices)
+        return NoMotion(coordinate, position, names, scale * needed, scale * allowed, static_tension=static)
     is_start = cell < 0
     ends = (solution.low[0], solution.high[0]) if is_start else (0.0, path.cap()[-1])
-    low, high = (slope * float(np.sqrt(max(x, 0.0))) for x in ends)
-    speed = slope * float(np.sqrt(path.ends[0 if is_start else 1]))
+    low, high = (scale * float(np.sqrt(max(x, 0.0))) for x in ends)
+    speed = scale * float(np.sqrt(path.ends[0 if is_start else 1]))
     nearest = low if speed < low else high
     return NoMotion(coordinate, position, (), speed, nearest, "start" if is_start else "end", (low, high), static)
 
 
 def _state(path: Discrete, node: int) -> State:
-    places = places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
-    return state_at(jax.tree.map(lambda leaf: leaf[0], places))
+    points = points_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
+    return state_at(jax.tree.map(lambda x: x[0], points))
 
 
 def _static_tension(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
-    # The tension at the place itself, or else at an end at which the motion is to rest.
+    # The tension at the point itself, or else at an end at which the motion is to rest.
     ends = [end for end, x in zip((0, len(path.grid.width)), path.ends, strict=True) if x == 0.0]
     tensions = (static_tension(problem, _state(path, each)) for each in (node, *ends))
     return next((tension for tension in tensions if tension is not None), None)
 
 
-def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:
+def _contradiction(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:
     # The path speed that is nearest to possible: the path acceleration that one half-plane needs there, the largest
     # one that another leaves, and their numbers.
     start, end, twice = path.start, path.end, 2.0 * float(path.grid.width[cell])
     u = np.concatenate([start.u[cell], end.u[cell] + twice * end.x[cell], [twice, -twice]])
     x = np.concatenate([start.x[cell], end.x[cell], [1.0, -1.0]])
     ahead = [solution.high[cell + 1], -solution.low[cell + 1]]
-    maximum = np.concatenate([start.most[cell], end.most[cell], ahead])
+    maximum = np.concatenate([start.bound[cell], end.bound[cell], ahead])
     table = np.stack([np.where(u > FLAT, u, 0.0), np.where(u < -FLAT, u, 0.0), x], axis=1)
     bounds = [(None, None), (None, None), (0.0, float(path.cap()[cell]))]
     optimum = linprog([-1.0, 1.0, 0.0], table, maximum, bounds=bounds)
@@ -95,7 +140,7 @@ def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, 
     values = (maximum - x * best) / over
     upper, lower = np.where(u > FLAT, values, np.inf), np.where(u < -FLAT, values, -np.inf)
     minimum, largest = int(lower.argmax()), int(upper.argmin())
-    if upper[largest] >= lower[minimum]:  # a half-plane that does not bound the path acceleration forbids the place
+    if upper[largest] >= lower[minimum]:  # a half-plane that does not bound the path acceleration forbids the point
         alone = int(np.where(np.abs(u) > FLAT, np.inf, maximum - x * best).argmin())
         return np.nan, np.nan, (alone,)
     return float(lower[minimum]), float(upper[largest]), (minimum, largest)

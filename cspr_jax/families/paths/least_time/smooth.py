@@ -3,7 +3,7 @@
 Between nodes u = s'' changes at a constant rate along the path, so that x = s'^2 is quadratic there. The time is a
 convex function of x, and the half-planes at the nodes are linear in u and x (Verscheure et al. 2009): an interior-point
 method finds the optimum, with a banded matrix a step. The limit |du/ds| sqrt(x) <= J of the path jerk is not convex; it
-is replaced by its tangents at a known motion, which lie inside, and the optimum is that of the next tangents.
+is replaced by its tangents at an earlier motion, which lie inside, and the optimum is that of the next tangents.
 
 From rest and to rest, s is the cube of time over the first and the last cell: a constant jerk.
 """
@@ -20,11 +20,11 @@ from cspr_jax.families.paths.least_time.interior_point import interior_point
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Bands below and above the diagonal, with three unknowns a node; what keeps the matrix regular; smallest x over the
+# Diagonals below and above the main one, with three unknowns a node; what keeps the matrix regular; smallest x over the
 # largest from which the search starts.
-BANDS, REGULAR, LEAST = 4, 1e-14, 1e-12
-# Half-planes of each side that count about a motion, at its x and at a share of it; whose share of u is no smaller; by
-# how much others may be missed; how often these are added.
+BANDWIDTH, REGULAR, SMALLEST = 4, 1e-14, 1e-12
+# Half-planes of each side that count about a motion, at its x and at a fraction of it; whose coefficient of u is no
+# smaller; by how much others may be missed; how often these are added.
 NEAREST, SLOWER, FLAT, MISSED, MORE_ROWS = 6, 0.8, 1e-12, 1e-9, 4
 
 
@@ -40,42 +40,42 @@ class SectionEnds(NamedTuple):
     rests: tuple[bool, bool]
 
 
-class NodeRows(NamedTuple):
-    """Half-planes at the nodes, as `constraints.Rows` has them: u_share u + x_share x <= most, and x <= cap.
+class NodeHalfPlanes(NamedTuple):
+    """Half-planes at the nodes, as of `constraints.HalfPlanes`, and x <= cap.
 
     Fields:
         u: (n_rows, n_nodes).
         x: (n_rows, n_nodes).
-        most: (n_rows, n_nodes).
+        bound: (n_rows, n_nodes).
         cap: (n_nodes,) finite.
         width: (n_nodes - 1,) m.
     """
 
     u: np.ndarray
     x: np.ndarray
-    most: np.ndarray
+    bound: np.ndarray
     cap: np.ndarray
     width: np.ndarray
 
-    def nearest(self, x: Float[np.ndarray, "n_nodes"]) -> "NodeRows":
+    def nearest(self, x: Float[np.ndarray, "n_nodes"]) -> "NodeHalfPlanes":
         """The half-planes that bound u most, from either side, about a motion; duplicates among them."""
         if len(self.u) <= 4 * NEAREST:
             return self
         chosen = []
         over = np.where(np.abs(self.u) > FLAT, self.u, 1.0)
         for fraction in (1.0, SLOWER):
-            value = (self.most - fraction * self.x * x) / over
+            value = (self.bound - fraction * self.x * x) / over
             for sign in (1.0, -1.0):
                 bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
                 chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
-        places = np.concatenate(chosen)
-        u, x, maximum = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
-        return NodeRows(u, x, maximum, self.cap, self.width)
+        indices = np.concatenate(chosen)
+        u, x, maximum = (np.take_along_axis(side, indices, axis=0) for side in (self.u, self.x, self.bound))
+        return NodeHalfPlanes(u, x, maximum, self.cap, self.width)
 
-    def beside(self, others: "NodeRows") -> "NodeRows":
+    def beside(self, others: "NodeHalfPlanes") -> "NodeHalfPlanes":
         """These half-planes and others."""
         u, x, maximum = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
-        return NodeRows(u, x, maximum, self.cap, self.width)
+        return NodeHalfPlanes(u, x, maximum, self.cap, self.width)
 
     def with_cap(
         self,
@@ -86,7 +86,7 @@ class NodeRows(NamedTuple):
     ]:
         """Half-planes with the cap as the last one."""
         ones = np.ones((1, len(self.cap)))
-        pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.most, ones)
+        pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.bound, ones)
         u, x, maximum = (np.concatenate(pair) for pair in pairs)
         return u, x, maximum
 
@@ -103,9 +103,9 @@ class Smooth(NamedTuple):
     u: np.ndarray
 
 
-def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
+def smooth(half_planes: NodeHalfPlanes, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
     """Least time with a continuous path acceleration."""
-    near, motion = rows.nearest(start.x), start
+    near, motion = half_planes.nearest(start.x), start
     for time in range(times + MORE_ROWS):
         problem = _Problem(near, ends, jerk, motion.x)
         z, _, is_optimal = interior_point(problem, problem.start(motion))
@@ -113,9 +113,9 @@ def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times:
             return None
         motion = Smooth(z[:, 0], z[:, 1])
         if time >= times - 1:
-            if (rows.most - rows.u * motion.u - rows.x * motion.x).min() > -MISSED:
+            if (half_planes.bound - half_planes.u * motion.u - half_planes.x * motion.x).min() > -MISSED:
                 return motion
-            near = near.beside(rows.nearest(motion.x))
+            near = near.beside(half_planes.nearest(motion.x))
     return None
 
 
@@ -125,19 +125,19 @@ def below_ramps(
     """Motion that is no faster than another one, nor than ramps from rest and to rest are."""
     s = np.concatenate([[0.0], np.cumsum(width)])
     x = x.copy()
-    for way, rest in zip((s, s[-1] - s), ends.rests, strict=True):
+    for distance, rest in zip((s, s[-1] - s), ends.rests, strict=True):
         # s = J t^3 / 6
-        x = np.minimum(x, (0.5 * jerk) ** 2 * (6.0 * way / jerk) ** (4.0 / 3.0)) if rest else x
-    x[1:-1] = np.maximum(x[1:-1], LEAST * x.max())
+        x = np.minimum(x, (0.5 * jerk) ** 2 * (6.0 * distance / jerk) ** (4.0 / 3.0)) if rest else x
+    x[1:-1] = np.maximum(x[1:-1], SMALLEST * x.max())
     x[[0, -1]] = ends.speeds
     return Smooth(x, 0.5 * np.gradient(x, s))
 
 
 class _Time(NamedTuple):
-    # The duration, its gradient in x, and the bands of its Hessian: of x with itself, and with the next x.
+    # The duration, its gradient in x, and the diagonals of its Hessian: of x with itself, and with the next x.
     value: float
     gradient: np.ndarray
-    second_derivative: np.ndarray
+    hessian: np.ndarray
     coupling: np.ndarray
 
 
@@ -148,20 +148,16 @@ def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
     both = np.where(moves, speed, 0.0)[1:] + np.where(moves, speed, 0.0)[:-1]
     scaled = 2.0 * width
     scaled[0], scaled[-1] = ((3.0 if rest else 2.0) * width[end] for end, rest in zip((0, -1), rests, strict=True))
-    gradient, second_derivative = np.zeros(len(x)), np.zeros(len(x))
+    gradient, hessian = np.zeros(len(x)), np.zeros(len(x))
     for near in (slice(None, -1), slice(1, None)):
         gradient[near] -= 0.5 * scaled / (both**2 * speed[near])
-        second_derivative[near] += (
-            0.5 * scaled * (1.0 / (both**3 * speed[near] ** 2) + 0.5 / (both**2 * speed[near] ** 3))
-        )
+        hessian[near] += 0.5 * scaled * (1.0 / (both**3 * speed[near] ** 2) + 0.5 / (both**2 * speed[near] ** 3))
     coupling = np.where(moves[1:] & moves[:-1], 0.5 * scaled / (both**3 * speed[1:] * speed[:-1]), 0.0)
-    return _Time(
-        float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, second_derivative, 1.0), coupling
-    )
+    return _Time(float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, hessian, 1.0), coupling)
 
 
 class _Tangents(NamedTuple):
-    # Tangents of the limit of the path jerk: +-(u1 - u0) share + (x0 + x1) level <= 1, (n_cells,).
+    # Tangents of the limit of the path jerk: +-(u1 - u0) fraction + (x0 + x1) level <= 1, (n_cells,).
     fraction: np.ndarray
     level: np.ndarray
 
@@ -178,21 +174,21 @@ def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, 
 
 class _Problem:
     # Unknowns are x, u, and the multiplier of the equation of the cell that follows, (n_nodes, 3).
-    def __init__(self, rows: NodeRows, ends: SectionEnds, jerk: float, x: np.ndarray) -> None:
-        self.ends, self.width = ends, rows.width
-        self.tangents = _tangents(x, rows.width, jerk, ends.rests)
-        self.u, self.x, self.most = rows.with_cap()
-        count = len(rows.cap)
+    def __init__(self, half_planes: NodeHalfPlanes, ends: SectionEnds, jerk: float, x: np.ndarray) -> None:
+        self.ends, self.width = ends, half_planes.width
+        self.tangents = _tangents(x, half_planes.width, jerk, ends.rests)
+        self.u, self.x, self.bound = half_planes.with_cap()
+        count = len(half_planes.cap)
         self.free = np.ones((count, 3), bool)
         self.free[[0, -1], 0] = False
         self.free[[0, -1], 1] = ~np.array(ends.rests)
-        # Equations of the cells: shares of x and u at the start, then at the end, (2, 2, n_cells).
+        # Equations of the cells: coefficients of x and u at the start, then at the end, (2, 2, n_cells).
         one = np.ones(count - 1)
-        self.cells = np.array([[-one, -rows.width], [one, -rows.width]])
+        self.cells = np.array([[-one, -half_planes.width], [one, -half_planes.width]])
         for end, rest in zip((0, -1), ends.rests, strict=True):
             if rest:  # u D is 2/3 x towards rest
                 self.cells[:, :, end] = 0.0
-                self.cells[1 + end, :, end] = 2.0 / 3.0, -rows.width[end] * (1.0 + 2.0 * end)
+                self.cells[1 + end, :, end] = 2.0 / 3.0, -half_planes.width[end] * (1.0 + 2.0 * end)
 
     def start(self, motion: Smooth) -> np.ndarray:
         return np.stack([motion.x, np.where(self.free[:, 1], motion.u, 0.0), np.zeros(len(motion.x))], axis=1)
@@ -204,31 +200,31 @@ class _Problem:
         return z[1:-1, 0]
 
     def slacks(self, z: np.ndarray) -> np.ndarray:
-        slacks = self.most - self.u * z[:, 1] - self.x * z[:, 0]
-        return np.concatenate([slacks.ravel(), *(1.0 - side for side in self._turned(z))])
+        slacks = self.bound - self.u * z[:, 1] - self.x * z[:, 0]
+        return np.concatenate([slacks.ravel(), *(1.0 - side for side in self._tangent_values(z))])
 
     def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
         slacks = -self.u * step[:, 1] - self.x * step[:, 0]
-        return np.concatenate([slacks.ravel(), *(-side for side in self._turned(step))])
+        return np.concatenate([slacks.ravel(), *(-side for side in self._tangent_values(step))])
 
-    def _turned(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _tangent_values(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         change, total = self.tangents.fraction * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
         return total + change, total - change
 
-    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def jt_multipliers(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         of_rows = multipliers[: self.u.size].reshape(self.u.shape)
-        pushed = np.zeros_like(z)
-        pushed[:, 0], pushed[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
+        gradient = np.zeros_like(z)
+        gradient[:, 0], gradient[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
         up, down = multipliers[self.u.size :].reshape(2, -1)
         total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.fraction
-        pushed[:-1, 0] += total
-        pushed[1:, 0] += total
-        pushed[:-1, 1] -= difference
-        pushed[1:, 1] += difference
-        return np.where(self.free, pushed, 0.0)
+        gradient[:-1, 0] += total
+        gradient[1:, 0] += total
+        gradient[:-1, 1] -= difference
+        gradient[1:, 1] += difference
+        return np.where(self.free, gradient, 0.0)
 
     def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        residual = self.pushed(z, multipliers)
+        residual = self.jt_multipliers(z, multipliers)
         residual[:, 0] += _time(z[:, 0], self.width, self.ends.rests).gradient
         for side, nodes in enumerate((slice(None, -1), slice(1, None))):
             for column in (0, 1):
@@ -241,7 +237,7 @@ class _Problem:
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
         current, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
-        current[0, 0] = time.second_derivative + np.sum(of_rows * self.x**2, axis=0)
+        current[0, 0] = time.hessian + np.sum(of_rows * self.x**2, axis=0)
         current[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
         current[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
         ahead[0, 0] = time.coupling
@@ -257,20 +253,20 @@ class _Problem:
         current[2, :2, :-1] = current[:2, 2, :-1] = self.cells[0]
         current[2, 2, -1] = 1.0
         ahead[2, :2] = self.cells[1]
-        return solve_banded((BANDS, BANDS), self._bands(current, ahead), right.ravel(), check_finite=False).reshape(
-            z.shape
-        )
+        return solve_banded(
+            (BANDWIDTH, BANDWIDTH), self._banded(current, ahead), right.ravel(), check_finite=False
+        ).reshape(z.shape)
 
-    def _bands(self, here: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-        # Bands as SciPy takes them: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
+    def _banded(self, current: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+        # Banded matrix as SciPy takes it: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
         free = self.free.T
-        here = np.where(free[:, None] & free[None], here, np.eye(3)[:, :, None])
+        current = np.where(free[:, None] & free[None], current, np.eye(3)[:, :, None])
         ahead = np.where(free[:, None, :-1] & free[None, :, 1:], ahead, 0.0)
-        bands = np.zeros((2 * BANDS + 1, here.shape[2], 3))
+        banded = np.zeros((2 * BANDWIDTH + 1, current.shape[2], 3))
         for row in range(3):
             for column in range(3):
-                bands[BANDS + row - column, :, column] += here[row, column]
+                banded[BANDWIDTH + row - column, :, column] += current[row, column]
                 if column < 2:  # nothing depends on the multiplier of the cell after next
-                    bands[BANDS + row - column - 3, 1:, column] += ahead[row, column]
-                    bands[BANDS + column + 3 - row, :-1, row] += ahead[row, column]
-        return bands.reshape(2 * BANDS + 1, -1)
+                    banded[BANDWIDTH + row - column - 3, 1:, column] += ahead[row, column]
+                    banded[BANDWIDTH + column + 3 - row, :-1, row] += ahead[row, column]
+        return banded.reshape(2 * BANDWIDTH + 1, -1)

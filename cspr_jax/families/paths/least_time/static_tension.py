@@ -1,4 +1,4 @@
-"""Tension that keeps a robot from standing still at a place."""
+"""Tension that keeps a robot from standing still at a point."""
 
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ class StaticTension(NamedTuple):
         needed: N.
         allowed: N.
         is_largest: whether it is above the largest tension, and not below the smallest one.
-        position: (3,) the place, m.
+        position: (3,) the point, m.
     """
 
     cable: int

@@ -69,12 +69,12 @@ class CellSlacks(NamedTuple):
     """Bounds of the slacks of criteria over the cells of a motion, over their scales.
 
     Fields:
-        rows: criteria of tensions, speeds and accelerations.
+        criteria: criteria of tensions, speeds and accelerations.
         low: (n_cells, n_rows) lower bounds; of tensions over the weight, of others over what is allowed.
         high: (n_cells, n_rows) upper bounds of the smallest slacks.
     """
 
-    rows: list[Criterion]
+    criteria: list[Criterion]
     low: np.ndarray
     high: np.ndarray
 
@@ -86,15 +86,15 @@ class CellSlacks(NamedTuple):
     def grown(self, margins: GridMargins, weight: float) -> GridMargins:
         """Margins with which what is missed will be met."""
         # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
-        reach = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
+        radius = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
 
         def lacking(chosen: list[bool]) -> np.ndarray:
             missed = LEFT - self.low[:, chosen].min(1, initial=np.inf)
             more = np.where(missed > 0.0, MORE * missed + STEP, 0.0)
-            return maximum_filter1d(more, 2 * reach + 1, mode="nearest")
+            return maximum_filter1d(more, 2 * radius + 1, mode="nearest")
 
-        tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
-        others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
+        tension = weight * lacking([bool(criterion.flag & TENSIONS) for criterion in self.criteria])
+        others = (lacking([criterion.unit == unit for criterion in self.criteria]) for unit in (ACCELERATIONS, SPEEDS))
         return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
 
     def binding(
@@ -102,9 +102,12 @@ class CellSlacks(NamedTuple):
     ) -> tuple[tuple[BindingName, ...], Int[np.ndarray, "n_cells"]]:
         """The criterion that binds in each cell."""
         nearest = self.high.argmin(1)
-        names = [BindingName(row.flag.text, row.cables[0] if row.cables else None) for row in self.rows]
+        names = [
+            BindingName(criterion.flag.text, criterion.cables[0] if criterion.cables else None)
+            for criterion in self.criteria
+        ]
         binds = np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
-        if self.rows[-1].flag == Verdict.OVER_FEED:
+        if self.criteria[-1].flag == Verdict.OVER_FEED:
             last, (feeds, number) = names.pop(), np.unique(feed, return_inverse=True)
             binds = np.where(binds == len(names), len(names) + number, binds)
             names += [last._replace(feed=words.get(speed, f"{speed:g} m/s")) for speed in feeds.tolist()]
@@ -114,11 +117,15 @@ class CellSlacks(NamedTuple):
 def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
     """Bounds of slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds."""
     motions = [trial.motion for trial in trials]
-    robot, limits, several = problem.robot, problem.limits, SplineBatch(motions)
-    rows = criteria(robot, limits)
+    robot, limits, splines = problem.robot, problem.limits, SplineBatch(motions)
+    all_criteria = criteria(robot, limits)
     weight = float(robot.mass * robot.gravity)
-    chosen = [k for k, row in enumerate(rows) if row.flag & TENSIONS or row.unit in (SPEEDS, ACCELERATIONS)]
-    scales = np.array([weight if rows[k].flag & TENSIONS else rows[k].allowed for k in chosen])
+    chosen = [
+        k
+        for k, criterion in enumerate(all_criteria)
+        if criterion.flag & TENSIONS or criterion.unit in (SPEEDS, ACCELERATIONS)
+    ]
+    scales = np.array([weight if all_criteria[k].flag & TENSIONS else all_criteria[k].allowed for k in chosen])
     knots = [np.asarray(motion.knots) for motion in motions]
     counts = [len(each) - 1 for each in knots]
     start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))
@@ -127,7 +134,7 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
     has_feed = bool(np.isfinite(feed).any())
 
     def bounded(cell: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
-        states = several.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
+        states = splines.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
         below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
         if not has_feed:
             return below, above
@@ -138,7 +145,7 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
 
     low, high = close_bounds(bounded, (start, end), STEP, HALVINGS)
     parts = (np.split(side, np.cumsum(counts)[:-1]) for side in (low, high))
-    named = [rows[k] for k in chosen] + [Criterion(Verdict.OVER_FEED, (), SPEEDS, sense="most")] * has_feed
+    named = [all_criteria[k] for k in chosen] + [Criterion(Verdict.OVER_FEED, (), SPEEDS, sense="most")] * has_feed
     return [CellSlacks(named, *sides) for sides in zip(*parts, strict=True)]
 
 

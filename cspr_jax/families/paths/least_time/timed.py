@@ -1,7 +1,7 @@
 """Motion along a path in time: quintic pieces through positions, velocities and accelerations at the nodes.
 
 The motion that controllers play, and that is proved, is this one. It meets the path at the nodes; between them it is
-off by what a quintic piece misses, which is told.
+off by what a quintic piece misses, which is returned.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section
-from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, places_on
+from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, points_on
 from cspr_jax.numerics.elementary import as_float64
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Instants in a cell at which the distance from the path is taken.
-SHARES = (0.25, 0.5, 0.75)
+# Times in a cell at which the distance from the path is taken.
+FRACTIONS = (0.25, 0.5, 0.75)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -46,13 +46,11 @@ def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np
     r, weights = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
     starts, ends = (run.x[:-1] == 0.0)[:, None], (run.x[1:] == 0.0)[:, None]
     fraction = np.where(starts, r**2, np.where(ends, 1.0 - (1.0 - r) ** 2, r))
-    stretch = np.where(starts, 2.0 * r, np.where(ends, 2.0 * (1.0 - r), 1.0))
-    second_derivative = (run.after - run.before)[:, None]
-    x = run.x[:-1, None] + 2.0 * width[:, None] * (
-        run.before[:, None] * fraction + 0.5 * second_derivative * fraction**2
-    )
+    derivative = np.where(starts, 2.0 * r, np.where(ends, 2.0 * (1.0 - r), 1.0))
+    u_change = (run.after - run.before)[:, None]
+    x = run.x[:-1, None] + 2.0 * width[:, None] * (run.before[:, None] * fraction + 0.5 * u_change * fraction**2)
     with np.errstate(invalid="ignore", divide="ignore"):  # of cells that no motion runs through
-        times = width * np.sum(weights * stretch / np.sqrt(x), axis=1)
+        times = width * np.sum(weights * derivative / np.sqrt(x), axis=1)
     for end, rest in zip((0, -1), run.rests, strict=True):
         if rest:
             times[end] = 3.0 * width[end] / np.sqrt(run.x[1 + 3 * end])
@@ -69,8 +67,8 @@ def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
     times = cell_times(run, grid.width)
     speeds = np.sqrt(run.x)
     sides = [
-        derivatives(places_on(section.curve, grid.nodes[:-1], ahead=True)),
-        derivatives(places_on(section.curve, grid.nodes[1:], ahead=False)),
+        derivatives(points_on(section.curve, grid.nodes[:-1], ahead=True)),
+        derivatives(points_on(section.curve, grid.nodes[1:], ahead=False)),
     ]
     tables = []
     for start, end in zip(*sides, strict=True):
@@ -98,19 +96,19 @@ def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
 
 
 def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion: Spline) -> float:
-    """Largest distance of the motion from the path, at some instants of each cell."""
+    """Largest distance of the motion from the path, at some times of each cell."""
     times, speeds = np.diff(motion.knots), np.sqrt(run.x)
     # The path coordinate as a quintic in time too; across the path its error is of no account.
     ends = (grid.nodes[:-1], speeds[:-1], run.before), (grid.nodes[1:], speeds[1:], run.after)
     first, last = (tuple(x[:, None] for x in end) for end in ends)
-    way = _quintic(first, last, times[:, None])
+    path_coordinate = _quintic(first, last, times[:, None])
     largest = 0.0
-    for fraction in SHARES:
-        values = [_at(table, fraction) for table in (way, np.asarray(motion.position))]
-        place, ahead, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
+    for fraction in FRACTIONS:
+        values = [_at(table, fraction) for table in (path_coordinate, np.asarray(motion.position))]
+        position, ahead, _ = derivatives(points_on(section.curve, values[0][:, 0], ahead=True))[0]
         # A body that turns on the spot has no direction.
-        slopes = np.linalg.norm(ahead, axis=1, keepdims=True)
-        off, along = values[1] - place, ahead / np.where(slopes > 0.0, slopes, 1.0)
+        norms = np.linalg.norm(ahead, axis=1, keepdims=True)
+        off, along = values[1] - position, ahead / np.where(norms > 0.0, norms, 1.0)
         off = off - np.sum(off * along, axis=1, keepdims=True) * along
         largest = max(largest, float(np.linalg.norm(off, axis=1).max()))
     return largest

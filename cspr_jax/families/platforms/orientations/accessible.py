@@ -1,4 +1,4 @@
-"""Accessible orientations of a platform at a place, thesis section 3.10.2, by three definitions.
+"""Accessible orientations of a platform at a position, thesis section 3.10.2, by three definitions.
 
 "grid": the multiples of the step of tilt and torsion that chains of neighbours join to the reference orientation.
 "scan": Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 DEFINITIONS = ("grid", "scan", "equal-volume")
 # Steps along rays that are tried at a time: few rays go farther, and with the usual number of rays these steps fill
 # three batches of `OrientationSteps`.
-LEG = 23
-WHOLE = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma
+RAY_STEPS = 23
+SO3_VOLUME = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma
 
 
 class Accessible(NamedTuple):
-    """Accessible orientations of one place.
+    """Accessible orientations at one position.
 
     Fields:
-        angles: (n, 3) tilt and torsion in the cylindrical frame of the place, rad.
+        angles: (n, 3) tilt and torsion in the cylindrical frame of the position, rad.
         volume: (n,) part of SO(3) that each orientation stands for.
         of_points: part of all grid points; NaN for a scan, which has no grid.
     """
@@ -52,11 +52,11 @@ def _grid(definition: str, divisions: int) -> OrientationGrid:
     return (tilt_torsion_grid if definition == "grid" else equal_volume_grid)(divisions)
 
 
-def accessible(robot: PlatformRobot, place: Float[np.ndarray, "3"], definition: str, divisions: int) -> Accessible:
-    """The accessible orientations of a place."""
+def accessible(robot: PlatformRobot, position: Float[np.ndarray, "3"], definition: str, divisions: int) -> Accessible:
+    """The accessible orientations at a position."""
     stage("accessible orientations")
-    steps = OrientationSteps(robot, place)
-    towards = cylindrical_frames(np.asarray(place, float))
+    steps = OrientationSteps(robot, position)
+    towards = cylindrical_frames(np.asarray(position, float))
     if definition == "scan":
         parts = list(_scan(steps, towards, divisions))
         angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))
@@ -72,7 +72,7 @@ def accessible(robot: PlatformRobot, place: Float[np.ndarray, "3"], definition: 
 
 
 def accessible_sets(robot: PlatformRobot, grids: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
-    """The accessible orientations of many places, by two threads."""
+    """The accessible orientations at many positions, by two threads."""
     return in_threads(lambda grid: accessible(robot, grid[0], definition, grid[1]), grids)
 
 
@@ -102,9 +102,9 @@ def _section(
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     far = np.arange(count + 1) * step
     made, going = np.zeros(count, int), np.arange(count)
-    for start in range(0, count, LEG):
-        leg = far[start : start + LEG + 1]
-        free = _free(steps, towards, _angles(centre + leg[:, None] * rays[going, None], np.asarray(torsion)))
+    for start in range(0, count, RAY_STEPS):
+        radii = far[start : start + RAY_STEPS + 1]
+        free = _free(steps, towards, _angles(centre + radii[:, None] * rays[going, None], np.asarray(torsion)))
         made[going] += free.sum(1)
         going = going[free.all(1)]
         if not len(going):
@@ -113,7 +113,7 @@ def _section(
     ray, last = np.nonzero(np.arange(count) < made[:, None])
     reached = _angles(centre + far[last + 1, None] * rays[ray], np.asarray(torsion))
     # Each orientation stands for a sector of the plane, where the measure is sin(theta) / theta.
-    volume = far[last + 1] * np.sinc(reached[:, 1] / math.pi) * step**3 / WHOLE
+    volume = far[last + 1] * np.sinc(reached[:, 1] / math.pi) * step**3 / SO3_VOLUME
     return (reached, volume), ends.mean(0)
 
 

@@ -1,4 +1,4 @@
-"""Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
+"""Accessible orientations at a position that a horizontal transition from rest attains, thesis section 3.12.3."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 VALUES = 20
 # The preferred value is tried first, then every fifth of the others, then the rest.
 FEWER = 5
-# Sizes of parts, large enough to fill batches: candidates of a search for the smallest numbers of arcs; motions of a
+# Cases of a part, enough to fill batches: candidates of a search for the smallest numbers of arcs; motions of a
 # search that only tells whether there is one; and the stride by which the latter are mixed.
 LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 
 def attainable(
     checker: MotionChecker,
-    places: Float[np.ndarray, "n 3"],
+    positions: Float[np.ndarray, "n 3"],
     angles: Float[np.ndarray, "n 3"],
     z0: Float[np.ndarray, "n"],
     *,
@@ -40,12 +40,12 @@ def attainable(
     symmetry: Symmetries = NONE,
     margins: bool = True,
 ) -> PlatformMotionAnswers:
-    """Smallest numbers of arcs from rest to orientations of places."""
-    representatives, inverse = _once(checker, places, angles, z0, symmetry)
+    """Smallest numbers of arcs from rest to orientations at positions."""
+    representatives, inverse = _once(checker, positions, angles, z0, symmetry)
 
-    def part(rows):
-        rows = representatives[rows]
-        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
+    def part(indices):
+        indices = representatives[indices]
+        motions, beta_hats = _motions(checker, positions[indices], angles[indices], z0[indices], values)
         return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
 
     return joined(in_parts(part, len(representatives), LARGE // values)).rows(inverse)
@@ -53,7 +53,7 @@ def attainable(
 
 def attained(
     checker: MotionChecker,
-    places: Float[np.ndarray, "n 3"],
+    positions: Float[np.ndarray, "n 3"],
     angles: Float[np.ndarray, "n 3"],
     z0: Float[np.ndarray, "n"],
     *,
@@ -62,27 +62,27 @@ def attained(
     tried: Int[np.ndarray, "k"] | None = None,
     symmetry: Symmetries = NONE,
 ) -> Float[np.ndarray, "n"]:
-    """Orientations of places that some number of arcs and some value of beta-hat attains.
+    """Orientations at positions that some number of arcs and some value of beta-hat attains.
 
     `attainable` also tells how, or why not; this function does half of the work.
     """
-    representatives, inverse = _once(checker, places, angles, z0, symmetry)
+    representatives, inverse = _once(checker, positions, angles, z0, symmetry)
     each = rounds(values) if tried is None else (tried,)
 
-    def part(rows):
-        rows = representatives[rows]
-        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
-        is_attained = np.zeros(len(rows), bool)
+    def part(indices):
+        indices = representatives[indices]
+        motions, beta_hats = _motions(checker, positions[indices], angles[indices], z0[indices], values)
+        is_attained = np.zeros(len(indices), bool)
         for numbers in each:
             left, options = np.flatnonzero(~is_attained), beta_hats[:, numbers]
-            size = max(CANDIDATES // max(options.shape[1], 1), 1)
-            for piece in (left[k : k + size] for k in range(0, len(left), size)):
+            chunk = max(CANDIDATES // max(options.shape[1], 1), 1)
+            for piece in (left[k : k + chunk] for k in range(0, len(left), chunk)):
                 cell, trial = trials(motions.motions(piece), options[piece])
                 arcs = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=False).arcs
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 
-    # Places differ in how long they take: each part gets some of all.
+    # Positions differ in how long they take: each part gets some of all.
     mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
     flags = np.empty(len(representatives), bool)
     representatives[:] = representatives[mixed]
@@ -96,18 +96,18 @@ def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
-def _once(checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
-    # Find the orientations that represent all, and the place of each orientation's representative among them.
-    representatives, inverse = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
+def _once(checker: MotionChecker, positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+    # Find the orientations that represent all, and the index of each orientation's representative among them.
+    representatives, inverse = np.unique(alike(symmetry, np.c_[positions, z0], angles), return_inverse=True)
     return representatives, inverse.ravel()
 
 
 def _motions(
-    checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+    checker: MotionChecker, positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
     # Return transitions from rest, and values (n, n_values) of beta-hat at their ends.
     count = len(angles)
-    ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
+    ends = (positions, from_tilt_torsion(angles + cylindrical_frames(positions)))
     beta_hats, can_end = checker.end_options(*ends, z0, values)
     start = (rest_point(z0), np.tile(IDENTITY, (count, 1)))
     rest = np.full(count, AT_REST)

@@ -1,4 +1,4 @@
-"""Cables at still poses of a platform, and between neighbouring ones, thesis section 3.10.2.
+"""Cables at poses of a platform at rest, and between neighbouring ones, thesis section 3.10.2.
 
 On more than six cables the wrench matrix has no determinant whose sign a path could change: a pose is regular where
 the rank is full, on either side of the spools, and the platform is met only where its attachment points lie in a plane.
@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Int
 
 BATCH = 512
-# Gaps between cables below this part of the platform's size count as zero. A cable that makes a smaller angle with the
-# platform lies in it, and counts as on the side where it is in the reference orientation: it has not yet passed over.
+# Gaps between cables below this part of the platform's radius count as zero. A cable that makes a smaller angle with
+# the platform lies in it, and counts as on the side where it is in the reference orientation: it has not yet passed
+# over.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -44,9 +45,9 @@ class OrientationSamples(NamedTuple):
     """Determinants and vectors of cables of n poses.
 
     Fields:
-        fraction: (n,) determinant over the determinant of the reference orientation at the same place; NaN where the
-            reference orientation is singular itself, or the place is not below the spools. On more than six cables the
-            root of the determinant of the matrix times its transpose.
+        fraction: (n,) determinant over the determinant of the reference orientation at the same position; NaN where the
+            reference orientation is singular itself, or the position is not below the spools. On more than six cables
+            the root of the determinant of the matrix times its transpose.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
         cable_directions: (n, n_cables, 3) cables seen from the platform, m.
     """
@@ -58,71 +59,73 @@ class OrientationSamples(NamedTuple):
 
 @partial(jax.jit, static_argnames="pairs")
 def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
-    places, quaternions = poses
+    positions, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
     rotation = materialized(rotation_matrix([quaternions[:, i] for i in range(4)]), one)
-    cables = cable_lanes(robot, [places[:, i] for i in range(3)], rotation)
+    cables = cable_lanes(robot, [positions[:, i] for i in range(3)], rotation)
     cables = cables._replace(rays=materialized(cables.rays, one))
-    apart, directions = (
+    cable_gaps, directions = (
         interference_lanes.gaps(robot.base_points, pairs, cables),
         interference_lanes.cable_directions(cables, rotation),
     )
     is_determined = robot.n_cables == robot.dof
-    size = wrench_lanes.normalised_determinant(robot, cables) if is_determined else _volumes(robot, places, quaternions)
-    return size, *interference_lanes.as_arrays(apart, directions)
+    determinant = (
+        wrench_lanes.normalised_determinant(robot, cables) if is_determined else _volumes(robot, positions, quaternions)
+    )
+    return determinant, *interference_lanes.as_arrays(cable_gaps, directions)
 
 
-def _volumes(robot: PlatformRobot, places: Array, quaternions: Array) -> Array:
-    def one(place: Array, quaternion: Array) -> Array:
-        matrix = robot.wrench_matrix(at_rest(place, rotations.matrix(quaternion))) / wrench_units(robot)[:, None]
+def _volumes(robot: PlatformRobot, positions: Array, quaternions: Array) -> Array:
+    def one(position: Array, quaternion: Array) -> Array:
+        matrix = robot.wrench_matrix(at_rest(position, rotations.matrix(quaternion))) / wrench_units(robot)[:, None]
         return jnp.sqrt(jnp.maximum(solved(matrix @ matrix.T, jnp.zeros((robot.dof, 0)))[1], 0.0))
 
-    return jax.vmap(one)(places, quaternions)
+    return jax.vmap(one)(positions, quaternions)
 
 
-def reference_share(robot: PlatformRobot, place: Float[np.ndarray, "3"]) -> float:
-    """Determinant of the reference orientation at a place, if its sign is the same as in the middle."""
+def reference_determinant(robot: PlatformRobot, position: Float[np.ndarray, "3"]) -> float:
+    """Determinant of the reference orientation at a position, if its sign is the same as in the middle."""
     if robot.n_cables > robot.dof:
         return 1.0
-    current, depth, fraction = _upright(robot, np.asarray(place, float))
+    current, depth, fraction = _upright(robot, np.asarray(position, float))
     return float(current) if float(depth) > 0.0 and bool(is_regular(fraction)) else np.nan
 
 
 @jax.jit
-def _upright(robot: PlatformRobot, place: Array) -> tuple[Array, Array, Array]:
+def _upright(robot: PlatformRobot, position: Array) -> tuple[Array, Array, Array]:
     upright = jnp.eye(3)
-    fraction = determinant_ratio(robot, place, upright)
-    return normalised_determinant(robot, place, upright), plane_normal(robot) @ place, fraction
+    fraction = determinant_ratio(robot, position, upright)
+    return normalised_determinant(robot, position, upright), plane_normal(robot) @ position, fraction
 
 
 class OrientationSteps:
-    """Steps between orientations of a platform at one place.
+    """Steps between orientations of a platform at one position.
 
     Args:
         robot: in its reference axes.
-        place: (3,) of the mass centre, m.
+        position: (3,) of the mass centre, m.
     """
 
-    def __init__(self, robot: PlatformRobot, place: np.ndarray) -> None:
+    def __init__(self, robot: PlatformRobot, position: np.ndarray) -> None:
         """Find which cables can meet each other or the platform."""
-        self._robot, self._place = robot, np.asarray(place, float)
+        self._robot, self._position = robot, np.asarray(position, float)
         self._contacts: Contacts = contacts(robot)
         self._is_flat = robot.n_cables == robot.dof or has_sectors(robot, default_scene(robot))
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
-        self._reference = reference_share(robot, self._place)
-        self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
-        self._side = np.zeros(robot.n_cables)  # of each cable; not yet known, and nothing lies in the platform there
+        self._reference = reference_determinant(robot, self._position)
+        self._radius = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
+        self._side = np.zeros(robot.n_cables)  # of each cable; not yet computed, and nothing lies in the platform there
         self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
     def at(self, quaternions: Float[np.ndarray, "n 4"]) -> OrientationSamples:
         """Determinants and vectors of cables of orientations."""
-        places = np.broadcast_to(self._place, (len(quaternions), 3))
+        positions = np.broadcast_to(self._position, (len(quaternions), 3))
         sampled = in_batches(
-            partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), batch_size=BATCH
+            partial(_sampled, self._robot, pairs=self._pairs), (positions, np.asarray(quaternions)), batch_size=BATCH
         )
         fraction, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
-        gaps[_squares(gaps) < (TOUCHING * self._size) ** 2] = 0.0
+        gaps[_squares(gaps) < (TOUCHING * self._radius) ** 2] = 0.0
         # Neither does the sign of the height of cables that lie in the platform: they are put on one side of it.
         height, minimum = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
         height = np.where(np.abs(height) < minimum, 2.0 * minimum * self._side - height, 0.0)
@@ -139,9 +142,9 @@ class OrientationSteps:
     ) -> Bool[np.ndarray, "n"]:
         """Possible steps from one orientation to a neighbouring one."""
         is_regular = self.regular(samples)
-        ways = np.flatnonzero(is_regular[first] & is_regular[last])
+        open_steps = np.flatnonzero(is_regular[first] & is_regular[last])
         free = np.zeros(len(first), bool)
-        for chunk in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
+        for chunk in np.array_split(open_steps, max(1, -(-len(open_steps) // STEPS))):
             one, two = first[chunk], last[chunk]
             free[chunk] = ~cables_cross(samples.gaps[one], samples.gaps[two]).any(1)
             if self._is_flat:

@@ -30,15 +30,15 @@ class PosesMap(PlatformMap):
     proves = True
     any_cables = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse a start whose quaternion is no orientation."""
-        super().__init__(robot_file, keys, file)
-        start = keys.trajectory.start
+        super().__init__(robot_file, spec, file)
+        start = spec.trajectory.start
         self._quaternion = given_quaternion(
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
         from_rest = start is None or start.rest
-        self._checker = pose_checker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._checker = pose_checker(self._problem, motion_kind(spec.trajectory, from_rest=from_rest), batch=MANY)
         self._scene = self._surroundings(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -80,15 +80,15 @@ class PosesMap(PlatformMap):
         start, count = self._keys.trajectory.start, len(z0)
         if start is None or start.position is None:
             return rest_poses(z0), np.full(count, AT_REST)
-        place = np.tile(self._frame.inward(start.position), (count, 1))
+        position = np.tile(self._frame.inward(start.position), (count, 1))
         rotated = np.tile(self._frame.rotated_quaternions(self._quaternion), (count, 1))
         if start.tilt_torsion is not None:
-            rotated = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
+            rotated = orientations(self._frame, position, np.tile(start.tilt_torsion, (count, 1)))
         beta_hat = start.beta_hat
         beta_hats = (
-            start_beta_hat(self._checker, (place, rotated), z0) if beta_hat is None else np.full(count, beta_hat)
+            start_beta_hat(self._checker, (position, rotated), z0) if beta_hat is None else np.full(count, beta_hat)
         )
-        return (place, rotated), beta_hats
+        return (position, rotated), beta_hats
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""

@@ -14,39 +14,39 @@ if TYPE_CHECKING:
 
 HALVINGS = 12
 # Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.
-LEAST_COSINE = 0.8
+MIN_COSINE = 0.8
 
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
 
 
-def passed_over(
+def crossings(
     cable_vectors: Callable[[np.ndarray, np.ndarray], CableVectors],
     platform: tuple[Float[np.ndarray, "n_cables 2 3"], Float[np.ndarray, "3"]] | None,
-    row: Float[np.ndarray, "k"],
+    motion: Float[np.ndarray, "k"],
     ends: tuple[Float[np.ndarray, "k"], Float[np.ndarray, "k"]],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and motions in whose steps a cable passes over the platform."""
+    """Motions in whose steps cables cross, and motions in whose steps a cable crosses the platform."""
     met, hit = (np.zeros(count, bool) for _ in range(2))
-    if not len(row):
+    if not len(motion):
         return met, hit
-    vectors = tuple(cable_vectors(row, tau) for tau in ends)
+    vectors = tuple(cable_vectors(motion, tau) for tau in ends)
     for level in range(HALVINGS + 1):
         (gap, direction), (next_gap, next_direction) = vectors
         is_open = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
-        is_closed = ~is_open if level < HALVINGS else np.ones(len(row), bool)
-        met[row[is_closed & cables_cross(gap, next_gap).any(1)]] = True
+        is_closed = ~is_open if level < HALVINGS else np.ones(len(motion), bool)
+        met[motion[is_closed & cables_cross(gap, next_gap).any(1)]] = True
         if platform is not None:
-            hit[row[is_closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
-        row, before, after = row[~is_closed], ends[0][~is_closed], ends[1][~is_closed]
-        if not len(row):
+            hit[motion[is_closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
+        motion, before, after = motion[~is_closed], ends[0][~is_closed], ends[1][~is_closed]
+        if not len(motion):
             break
         middle = 0.5 * (before + after)
-        between = cable_vectors(row, middle)
+        between = cable_vectors(motion, middle)
         first, last = ((gap[~is_closed], direction[~is_closed]) for gap, direction in vectors)
         vectors = _joined(first, between), _joined(between, last)
         ends = np.concatenate([before, middle]), np.concatenate([middle, after])
-        row = np.concatenate([row, row])
+        motion = np.concatenate([motion, motion])
     return met, hit
 
 
@@ -56,5 +56,5 @@ def _joined(first: CableVectors, second: CableVectors) -> CableVectors:
 
 def _turns_much(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     inner = (before * after).sum(2)
-    sizes = (before * before).sum(2) * (after * after).sum(2)
-    return ((inner < 0.0) | (inner**2 < LEAST_COSINE**2 * sizes)).any(1)
+    squares = (before * before).sum(2) * (after * after).sum(2)
+    return ((inner < 0.0) | (inner**2 < MIN_COSINE**2 * squares)).any(1)

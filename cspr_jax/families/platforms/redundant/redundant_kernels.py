@@ -1,4 +1,4 @@
-"""Compiled states of motions on more than six cables, and the wrenches that they need, at many instants."""
+"""Compiled states of motions on more than six cables, and the wrenches that they need, at many times."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 
-class PoseInstants(NamedTuple):
-    """Poses, wrenches and slacks of motions at n instants.
+class PoseSamples(NamedTuple):
+    """Poses, wrenches and slacks of motions at n times.
 
     Fields:
         position: (n, 3) m.
@@ -38,23 +38,23 @@ class PoseInstants(NamedTuple):
 
 
 @partial(jax.jit, static_argnames="kind")
-def instants(
+def samples_of(
     problem: Problem,
     pairs: Float[Array, "n_pairs 2"],
     items: tuple[PlatformSegment, Array, Array],
     *,
     kind: PlatformMotionKind,
-) -> PoseInstants:
-    """Poses, wrenches and slacks of motions, each at an instant."""
+) -> PoseSamples:
+    """Poses, wrenches and slacks of motions, each at one time."""
     robot, limits = problem.robot, problem.limits
 
     def one(segment, arcs, tau):
         motion = PlatformMotion(segment, problem.amplitude, arcs, kind)
         state = motion.state(tau)
-        apart = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
-        nearest = jnp.min(apart, initial=jnp.inf)
+        distances = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
+        nearest = jnp.min(distances, initial=jnp.inf)
         slacks = jnp.stack([*other_slacks(robot, limits, state, motion.z0), nearest])
-        return PoseInstants(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
+        return PoseSamples(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
 
     return jax.vmap(one)(*items)
 
@@ -67,7 +67,7 @@ def cable_vectors(
     *,
     kind: PlatformMotionKind,
 ) -> tuple[Float[Array, "n n_pairs 3"], Float[Array, "n n_cables 3"]]:
-    """Vectors between cables, and directions of cables, of motions, each at an instant."""
+    """Vectors between cables, and directions of cables, of motions, each at one time."""
 
     def one(segment, arcs, tau):
         state = PlatformMotion(segment, problem.amplitude, arcs, kind).state(tau)

@@ -2,9 +2,8 @@
 
 Files, each importing only from those above it:
 
-    slacks           criteria of one instant
-    slack_lanes      the same, one lane a case
-    screen           a first look, in single precision
+    slacks           criteria at one time, readable, and one lane a case
+    screen           a cheap test of most motions, in single precision
     cable_contacts   proofs that cables meet
     work_list        blocks that are closed, or halved; the few numbers that this needs of their nodes
     complex_bounds   bounds of a motion on an ellipse of complex time

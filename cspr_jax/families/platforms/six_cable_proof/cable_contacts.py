@@ -1,4 +1,4 @@
-"""Proofs that cables meet each other, or lie on the platform, in a step between two instants.
+"""Proofs that cables meet each other, or lie on the platform, in a step between two times.
 
 Two cables from a and b along u and v lie in one plane where F = (b - a) . (u x v) vanishes. If F changes its sign in a
 step, and the lines' nearest points stay inside both cables all the while, the cables meet in between. A cable is on the
@@ -6,7 +6,7 @@ platform where its height over the platform's plane vanishes while it points int
 
 A vector r with |r''| <= C stays within |r1 - r0| / 2 + C h^2 / 8 of the mean of its values at both ends of a step of
 length h; so what holds for all vectors within that distance holds during the step. Steps in which no sign changes are
-not looked at.
+skipped.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ import numpy as np
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
-# Rounding may move F, or a height, by this part of the product of the sizes of its factors.
+# Rounding may move F, or a height, by this part of the product of the norms of its factors.
 PRODUCT_ERROR = 1e-13
 
 
 class CablesOfStep(NamedTuple):
-    """Cables at instants of n blocks, equal steps apart.
+    """Cables at times of n blocks, with equal steps between them.
 
     Fields:
         rays: (m, n, n_cables, 3) from spool to platform, m.
         seen: (m, n, n_cables, 3) from platform to spool in platform axes, m.
         deviation: (n, n_cables) C h^2 / 8 of the rays, m.
-        seen_bent: (n,) C h^2 / 8 of the cables as the platform sees them, m.
+        seen_deviation: (n,) C h^2 / 8 of the cables as the platform sees them, m.
     """
 
     rays: np.ndarray
     seen: np.ndarray
     deviation: np.ndarray
-    seen_bent: np.ndarray
+    seen_deviation: np.ndarray
 
 
 class _Around(NamedTuple):
@@ -47,12 +47,12 @@ class _Around(NamedTuple):
         return _Around(np.cross(self.mean, other.mean), self._product_off(other))
 
     def dot(self, other: "_Around") -> tuple[np.ndarray, np.ndarray]:
-        # Return the least and the largest product.
+        # Return the smallest and the largest product.
         product, off = (self.mean * other.mean).sum(-1), self._product_off(other)
         return product - off, product + off
 
     def _product_off(self, other: "_Around") -> np.ndarray:
-        return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
+        return _norm(self.mean) * other.off + _norm(other.mean) * self.off + self.off * other.off
 
 
 def cables_meet(
@@ -61,18 +61,18 @@ def cables_meet(
     """Steps in which two cables meet for certain."""
     meets = np.full(cables.rays.shape[1], -1)
     i, j = pairs.T
-    apart = base[j] - base[i]
+    spools = base[j] - base[i]
     u, v = cables.rays[:, :, i], cables.rays[:, :, j]
-    volume = (np.cross(apart, u) * v).sum(-1)
-    step, block, pair = _sign_changes(volume, _size(apart) * (_size(u) * _size(v)).max(0))
+    volume = (np.cross(spools, u) * v).sum(-1)
+    step, block, pair = _sign_changes(volume, _norm(spools) * (_norm(u) * _norm(v)).max(0))
     first = _within(cables.rays, (step, block, i[pair]), cables.deviation)
     second = _within(cables.rays, (step, block, j[pair]), cables.deviation)
-    between = _Around(apart[pair], np.zeros(len(pair)))
+    between = _Around(spools[pair], np.zeros(len(pair)))
     normal = first.cross(second)
     minimum = normal.dot(normal)[0]
     inside = minimum > 0.0
     for other in (second, first):
-        # Bound the share of a cable at which the lines are nearest, times the square of the normal.
+        # Bound the fraction of a cable at which the lines are nearest, times the square of the normal.
         low, high = between.cross(other).dot(normal)
         inside &= (low > 0.0) & (high < minimum)
     meets[block[inside]] = step[inside]
@@ -84,30 +84,30 @@ def cables_hit(
 ) -> Int[np.ndarray, "n"]:
     """Steps in which a cable lies on the platform for certain."""
     hits = np.full(cables.seen.shape[1], -1)
-    step, block, cable = _sign_changes(cables.seen @ normal, _size(cables.seen).max(0))
-    deviation = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])
+    step, block, cable = _sign_changes(cables.seen @ normal, _norm(cables.seen).max(0))
+    deviation = np.broadcast_to(cables.seen_deviation[:, None], cables.seen.shape[1:3])
     seen = _within(cables.seen, (step, block, cable), deviation)
     one, two = sides[cable, 0], sides[cable, 1]
     # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
-    inside = np.cross(two, seen.mean) @ normal > _size(two) * seen.off
-    inside &= np.cross(seen.mean, one) @ normal > _size(one) * seen.off
+    inside = np.cross(two, seen.mean) @ normal > _norm(two) * seen.off
+    inside &= np.cross(seen.mean, one) @ normal > _norm(one) * seen.off
     inside |= (sides[cable] == 0.0).all((1, 2))  # the sector is all of the plane
     hits[block[inside]] = step[inside]
     return hits
 
 
-def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ...]:
+def _sign_changes(values: np.ndarray, magnitudes: np.ndarray) -> tuple[np.ndarray, ...]:
     # Return the steps, blocks and pairs (or cables) in which values (m, n, ...) change their sign, beyond rounding.
-    is_high, is_low = values > PRODUCT_ERROR * sizes, values < -PRODUCT_ERROR * sizes
+    is_high, is_low = values > PRODUCT_ERROR * magnitudes, values < -PRODUCT_ERROR * magnitudes
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
 def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], deviation: np.ndarray) -> _Around:
-    # Enclose vectors during the steps that begin at the given instants.
+    # Enclose vectors during the steps that begin at the given times.
     step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
-    return _Around(0.5 * (before + after), 0.5 * _size(after - before) + deviation[block, cable])
+    return _Around(0.5 * (before + after), 0.5 * _norm(after - before) + deviation[block, cable])
 
 
-def _size(vectors: np.ndarray) -> np.ndarray:
+def _norm(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt((vectors * vectors).sum(-1))

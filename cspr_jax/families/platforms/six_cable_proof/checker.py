@@ -1,8 +1,8 @@
-"""Feasibility of a platform's motions: proved on blocks of time, or refuted by an instant; and margins.
+"""Feasibility of a platform's motions: proved on blocks of time, or refuted by a sample; and margins.
 
-A first look at a few instants refutes most infeasible motions. Tensions, the determinant and the limits on the motion
-are then proved by `proof`, contacts and the limits on the pose by `place_proof`. Margins are the smallest values that
-are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
+A screen at a few samples refutes most infeasible motions. Tensions, the determinant and the limits on the motion
+are then proved by `tension_proof`, contacts and the limits on the pose by `pose_proof`. Margins are the smallest values
+that are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
 """
 
 from __future__ import annotations
@@ -19,15 +19,13 @@ from jax import Array
 from cspr_jax.families.platforms.beta_hat import end_options
 from cspr_jax.families.platforms.end_acceleration import endpoint
 from cspr_jax.families.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PlatformChecks
-from cspr_jax.families.platforms.motions import Motions
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
-from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes, state
+from cspr_jax.families.platforms.platform_segment import Motions, PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import phase_lanes, state
 from cspr_jax.families.platforms.six_cable_proof.enclosures import Robustness
 from cspr_jax.families.platforms.six_cable_proof.margins import Samples, narrowed
-from cspr_jax.families.platforms.six_cable_proof.pose_proof import PlaceCertifier, PlaceProof
-from cspr_jax.families.platforms.six_cable_proof.screen import FIRST, TensionSieve
-from cspr_jax.families.platforms.six_cable_proof.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.families.platforms.six_cable_proof.slacks import flags
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import PoseCertifier, PoseProof
+from cspr_jax.families.platforms.six_cable_proof.screen import FIRST, TensionScreen
+from cspr_jax.families.platforms.six_cable_proof.slacks import flags, moving_slacks, order, static_slacks
 from cspr_jax.families.platforms.six_cable_proof.tension_blocks import of_motion
 from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier, TensionProof
 from cspr_jax.motion.limits import allowance, limits_set, scales
@@ -50,7 +48,7 @@ if TYPE_CHECKING:
 
 # Largest number of blocks in a call, and of arcs that are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY
-# Instants that are looked at together.
+# Samples that are computed together.
 SAMPLES = 1 << 18
 # With margins, the bound must reach this part of the attained value.
 NEAR = 0.5
@@ -62,14 +60,14 @@ _end = jax.jit(endpoint)
 
 @persistent_jit(static_argnames=("pairs", "kind"))
 def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Float[Array, "n"], ...]:
-    """Slacks and distances between cables at instants."""
+    """Slacks and distances between cables at samples."""
     segments, arcs, tau = items
-    instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
-    current = state(segments, arcs, instant, kind)
+    phase = phase_lanes(problem.amplitude, segments.sense, arcs, tau)
+    current = state(segments, arcs, phase, kind)
     cables = cable_lanes(problem.robot, current.position, current.rotation)
     slacks = [
-        *moving_slacks(problem, segments, arcs, instant, kind),
-        *still_slacks(problem, segments, current, cables),
+        *moving_slacks(problem, segments, arcs, phase, kind),
+        *static_slacks(problem, segments, current, cables),
     ]
     squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
@@ -85,29 +83,29 @@ class PlatformChecker(MotionChecker):
         batch: how many motions are computed at a time.
 
     Fields:
-        sieve: the first look, which comes before checks.
-        done: numbers of instants that were looked at so far in the first look ("sieve") and in checks ("checks"), and
-            of motions that were checked ("motions").
+        screen: the cheap test that comes before checks.
+        done: numbers of samples that were computed so far in the screen ("screen") and in checks ("checks"), and of
+            motions that were checked ("motions").
     """
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
-        """Prepare the sieve and both proofs."""
+        """Prepare the screen and both proofs."""
         super().__init__(problem, kind, batch=batch)
-        self._lock, self.done = threading.Lock(), {"sieve": 0, "motions": 0, "checks": 0}
+        self._lock, self.done = threading.Lock(), {"screen": 0, "motions": 0, "checks": 0}
         self._compiling, self._compiled = threading.Lock(), set[bool]()
         self.flags = flags(problem.limits)
         knots = np.asarray(problem.amplitude.knots)
-        count, count_checks = partial(self._count, "sieve"), partial(self._count, "checks")
-        self.sieve = TensionSieve(problem.robot, problem.amplitude, kind, -SIX_CABLES_UNDECIDED, FIRST * batch, count)
-        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
-        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        count, count_checks = partial(self._count, "screen"), partial(self._count, "checks")
+        self.screen = TensionScreen(problem.robot, problem.amplitude, kind, -SIX_CABLES_UNDECIDED, FIRST * batch, count)
+        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_samples=count_checks)
+        self._poses = PoseCertifier(problem, kind, batch=min(batch, BLOCKS), count_samples=count_checks)
         self._robustness = None
         if problem.limits.uncertainty is not None:
-            self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+            self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_samples=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         basic, missed = flags(Limits()), [_missed(problem, row) for row in limits_set(problem.limits)]
         self._missed = np.array([SIX_CABLES_UNDECIDED] * len(basic) + missed)
-        # Place of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
+        # Index of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
 
@@ -131,14 +129,14 @@ class PlatformChecker(MotionChecker):
         return slack < -self._missed
 
     def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
-        motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
-        kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+        """Smallest slacks at some samples; see `MotionChecker.sampled`."""
+        motions, chunk = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
+        kernel = partial(slacks_at, self.problem, pairs=self._poses.pairs, kind=self.kind)
         minimum = []
-        for start in range(0, len(motions.arcs), size):
-            row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
-            instants = np.tile(tau, len(row) // len(tau))
-            slacks = in_batches(kernel, (*motions.items(row), instants), batch_size=self.batch)
+        for start in range(0, len(motions.arcs), chunk):
+            index = np.repeat(np.arange(start, min(start + chunk, len(motions.arcs))), len(tau))
+            times = np.tile(tau, len(index) // len(tau))
+            slacks = in_batches(kernel, (*motions.items(index), times), batch_size=self.batch)
             minimum.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
         return np.concatenate(minimum)
 
@@ -147,52 +145,52 @@ class PlatformChecker(MotionChecker):
         segments: PlatformSegment,
         arcs: np.ndarray,
         *,
-        whole: bool = True,
+        full: bool = True,
         margins: bool = True,
         ignored: np.ndarray | None = None,
     ) -> PlatformChecks:
         """Check motions in full; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
-        size = max(ARCS // max(arcs, default=1), 1)
-        for start in range(0, len(arcs), size):
-            piece = np.arange(start, min(start + size, len(arcs)))
-            checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins, ignored=ignored))
+        chunk = max(ARCS // max(arcs, default=1), 1)
+        for start in range(0, len(arcs), chunk):
+            piece = np.arange(start, min(start + chunk, len(arcs)))
+            checks.put(piece, self._checked(motions.take(piece), full=full, margins=margins, ignored=ignored))
         return checks
 
-    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PlatformChecks:
+    def _checked(self, motions: Motions, *, full: bool, margins: bool, ignored: np.ndarray | None) -> PlatformChecks:
         checks = self.nothing(len(motions.arcs))
         self._compile(motions, margins=margins)
-        moving, still = self._narrowed_criteria()
-        moving_ignored, still_ignored = (None if ignored is None else ignored[x] for x in (moving, still[:-1]))
+        moving, static = self._narrowed_criteria()
+        moving_ignored, static_ignored = (None if ignored is None else ignored[x] for x in (moving, static[:-1]))
         near = NEAR if margins else 0.0
         tensions = self._tensions.prove(*motions, near=near, margins=margins, ignored=moving_ignored)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
-        checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
-        open_rows = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
-        if not len(open_rows):
+        checks.refuted_tau[:] = np.where(tensions.is_refuted, tensions.refuted_tau, np.nan)
+        open_motions = np.flatnonzero(np.logical_or(full, ~tensions.is_refuted))
+        if not len(open_motions):
             return checks
-        part = motions.rows(open_rows)
-        places = self._places.prove(*part, margins=margins, ignored=still_ignored)
-        checks.instant[open_rows] = np.where(
-            tensions.is_refuted[open_rows], tensions.instant[open_rows], places.instant
+        part = motions.take(open_motions)
+        poses = self._poses.prove(*part, margins=margins, ignored=static_ignored)
+        checks.refuted_tau[open_motions] = np.where(
+            tensions.is_refuted[open_motions], tensions.refuted_tau[open_motions], poses.refuted_tau
         )
-        is_finite = ~np.isnan(tensions.attained[open_rows]).any(1) & ~np.isnan(places.attained).any(1)
+        is_finite = ~np.isnan(tensions.attained[open_motions]).any(1) & ~np.isnan(poses.attained).any(1)
         is_finite &= self.durations(*part) > 0.0
-        is_proved = tensions.is_proved[open_rows] & places.is_proved & is_finite
-        checks.bound[open_rows] = np.where(
-            is_proved, np.minimum(tensions.bound[open_rows, 0], places.bound[:, 0]), np.nan
+        is_proved = tensions.is_proved[open_motions] & poses.is_proved & is_finite
+        checks.bound[open_motions] = np.where(
+            is_proved, np.minimum(tensions.bound[open_motions, 0], poses.bound[:, 0]), np.nan
         )
-        minimum = self._attained(tensions.attained[open_rows], places.attained)
+        minimum = self._attained(tensions.attained[open_motions], poses.attained)
         if margins:
-            samples = _samples(moving, tensions, open_rows), _samples(still, places, np.arange(len(open_rows)))
-            self._narrow(minimum, part, samples, np.logical_or(whole, is_proved))
-        verdict = self._verdict(minimum[:-1], is_proved, places, ignored)
+            samples = _samples(moving, tensions, open_motions), _samples(static, poses, np.arange(len(open_motions)))
+            self._narrow(minimum, part, samples, np.logical_or(full, is_proved))
+        verdict = self._verdict(minimum[:-1], is_proved, poses, ignored)
         if ignored is None:
-            self._weigh(checks, open_rows, part, verdict)
-        checks.verdict[open_rows] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
-        checks.slack[open_rows] = np.where(is_finite, minimum[:-1], np.nan).T
-        checks.gap[open_rows] = np.where(is_finite, minimum[-1], np.nan)
+            self._apply_uncertainty(checks, open_motions, part, verdict)
+        checks.verdict[open_motions] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
+        checks.slack[open_motions] = np.where(is_finite, minimum[:-1], np.nan).T
+        checks.gap[open_motions] = np.where(is_finite, minimum[-1], np.nan)
         return checks
 
     def _compile(self, motions: Motions, *, margins: bool) -> None:
@@ -200,8 +198,8 @@ class PlatformChecker(MotionChecker):
         # wait.
         with self._compiling:
             if margins not in self._compiled:
-                one = motions.rows(np.arange(1))
-                in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._places])
+                one = motions.take(np.arange(1))
+                in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._poses])
                 self._compiled.add(margins)
 
     def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
@@ -210,72 +208,74 @@ class PlatformChecker(MotionChecker):
             return super().tolerated(segments, arcs)
         return self._robustness.tolerated(segments, arcs)
 
-    def _weigh(self, checks: PlatformChecks, rows: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
+    def _apply_uncertainty(
+        self, checks: PlatformChecks, indices: np.ndarray, motions: Motions, verdict: np.ndarray
+    ) -> None:
         # Judge motions that are feasible as planned by how much of the uncertainty they stand.
         feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(feasible):
             return
-        tolerances = self._robustness.tolerated(*motions.rows(feasible), full=False)
-        checks.tolerated[rows[feasible]], checks.not_tolerated[rows[feasible]] = tolerances
+        tolerances = self._robustness.tolerated(*motions.take(feasible), full=False)
+        checks.tolerated[indices[feasible]], checks.not_tolerated[indices[feasible]] = tolerances
         open_ones = np.where(tolerances.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
         verdict[feasible] = np.where(tolerances.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
 
     def _verdict(
-        self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof, ignored: np.ndarray | None
+        self, minimum: np.ndarray, is_proved: np.ndarray, poses: PoseProof, ignored: np.ndarray | None
     ) -> np.ndarray:
         # If a criterion is broken for certain, the verdict says only that.
-        verdict = Verdict.CABLE_CABLE.value * places.met | Verdict.CABLE_PLATFORM.value * places.hit
-        broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
+        verdict = Verdict.CABLE_CABLE.value * poses.met | Verdict.CABLE_PLATFORM.value * poses.hit
+        broken = self.breaks(minimum.T) & (True if ignored is None else ~ignored)
         for flag, column in zip(self.flags, broken.T, strict=True):
             verdict |= np.where(column, flag.value, 0)
         return np.where(is_proved, 0, np.where(verdict == 0, Verdict.UNDECIDED.value, verdict))
 
-    def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
+    def _attained(self, moving: np.ndarray, static: np.ndarray) -> np.ndarray:
         # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the
         # determinant second among the criteria that depend on the motion.
-        columns = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
-        return np.concatenate([columns[:, self._order], still[:, -1:]], axis=1).T
+        columns = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], static[:, :-1]], axis=1)
+        return np.concatenate([columns[:, self._order], static[:, -1:]], axis=1).T
 
     def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
-        # Find the places of the values of both proofs among the criteria, the distance between cables last. The
+        # Find the indices of the values of both proofs among the criteria, the distance between cables last. The
         # determinant stands second among the criteria that depend on the motion, and first after these among all.
-        places = np.argsort(self._order)
-        moving = places[[0, self._n_moving, *range(1, self._n_moving)]]
-        return moving, np.append(places[self._n_moving + 1 :], len(self.flags))
+        indices = np.argsort(self._order)
+        moving = indices[[0, self._n_moving, *range(1, self._n_moving)]]
+        return moving, np.append(indices[self._n_moving + 1 :], len(self.flags))
 
-    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
+    def _narrow(self, minima: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
         # Lower the attained values, (n_criteria + 1, n), of the selected motions to their margins.
-        def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
-            kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
-            return np.stack(in_batches(kernel, (*motions.items(row), tau), batch_size=self.batch))
+        def values_at(index: np.ndarray, tau: np.ndarray) -> np.ndarray:
+            kernel = partial(slacks_at, self.problem, pairs=self._poses.pairs, kind=self.kind)
+            return np.stack(in_batches(kernel, (*motions.items(index), tau), batch_size=self.batch))
 
-        rows = np.flatnonzero(selected)
-        if not len(rows):
+        indices = np.flatnonzero(selected)
+        if not len(indices):
             return
         # Limits on speeds and accelerations are proved by other functions of the same sign, and beyond a singularity
         # nothing is proved: start again from true slacks.
-        least[np.argsort(self._order)[1 : self._n_moving]] = np.inf
-        least[np.isneginf(least)] = np.inf
+        minima[np.argsort(self._order)[1 : self._n_moving]] = np.inf
+        minima[np.isneginf(minima)] = np.inf
         # Add the ends of motions, and both sides of knots, where slacks may jump.
         for tau in (0.0, 1.0, *self._knots):
-            least[:, rows] = np.fmin(least[:, rows], values_at(rows, np.full(len(rows), tau)))
+            minima[:, indices] = np.fmin(minima[:, indices], values_at(indices, np.full(len(indices), tau)))
         for one in samples:
-            narrowed(values_at, least, one, selected)
+            narrowed(values_at, minima, one, selected)
 
 
-def _missed(problem: Problem, row: Limit) -> float:
-    # Slack below which a limit counts as broken; that of a depth is over z0, at least a tenth of the robot's size.
-    robot, limit = problem.robot, float(np.min(getattr(problem.limits, row.name)))
+def _missed(problem: Problem, limit_row: Limit) -> float:
+    # Slack below which a limit counts as broken; that of a depth is over z0, at least a tenth of the spool radius.
+    robot, limit = problem.robot, float(np.min(getattr(problem.limits, limit_row.name)))
     units = scales(CABLES, robot.mass * robot.gravity, 0.1 * spool_radius(robot))
-    factor, size = units.get(row.quantity, (1.0, limit))
-    return 2.0 * factor * float(allowance(row, limit, robot) / size)
+    factor, unit = units.get(limit_row.quantity, (1.0, limit))
+    return 2.0 * factor * float(allowance(limit_row, limit, robot) / unit)
 
 
-def _samples(criteria: np.ndarray, proof: TensionProof | PlaceProof, rows: np.ndarray) -> Samples:
-    # Take samples of the motions in `rows` at the instants of their first blocks; motions are numbered within `rows`.
+def _samples(criteria: np.ndarray, proof: TensionProof | PoseProof, motions: np.ndarray) -> Samples:
+    # Take samples of the motions in `rows` at the times of their first blocks; motions are numbered within `rows`.
     numbers = np.full(len(proof.is_proved), -1)
-    numbers[rows] = np.arange(len(rows))
-    row = numbers[proof.row]
+    numbers[motions] = np.arange(len(motions))
+    motion = numbers[proof.motion]
     # A mask as an index would leave blocks as the slowest axis in memory.
-    row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
-    return Samples(criteria, row, tau, nodes)
+    motion, tau, nodes = (np.compress(motion >= 0, x, axis=-1) for x in (motion, proof.first.tau, proof.first.nodes))
+    return Samples(criteria, motion, tau, nodes)

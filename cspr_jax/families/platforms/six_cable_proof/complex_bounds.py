@@ -20,7 +20,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.families.platforms.platform_segment import PlatformSegment
-from cspr_jax.families.platforms.platform_segment_lanes import InstantLanes
+from cspr_jax.families.platforms.platform_segment_lanes import PhaseLanes
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import polynomial, sincospi
@@ -44,13 +44,13 @@ class Middle(NamedTuple):
     terms: Sequence[Array]
 
 
-class Reach(NamedTuple):
+class EllipseBounds(NamedTuple):
     """Bounds on an ellipse, (n,) each; derivatives in normalised time.
 
     Fields:
         speed: bound of |p'|, m.
         second_derivative: bound of |p''|, m.
-        radial_rate: bound of the norm of the rotation matrix.
+        rotation_norm: bound of the norm of the rotation matrix.
         rotation_rate: bound of the norm of the derivative of the rotation matrix.
         omega: bound of |omega|, rad.
         angular_acceleration: bound of |omega'|, rad.
@@ -58,7 +58,7 @@ class Reach(NamedTuple):
 
     speed: Array
     second_derivative: Array
-    radial_rate: Array
+    rotation_norm: Array
     rotation_rate: Array
     omega: Array
     angular_acceleration: Array
@@ -70,42 +70,40 @@ def middle_of(amplitude: Amplitude, tau: Float[Array, "n"]) -> Middle:
     return Middle(tau, [value / math.factorial(j) for j, value in enumerate(values)])
 
 
-def instant_beside(
-    middle: Middle, sense: Float[Array, "n"], arcs: Num[Array, "n"], off: Float[Array, "n"]
-) -> InstantLanes:
-    """Instant beside the middle of a block, by the polynomial piece of the middle."""
+def phase_beside(middle: Middle, sense: Float[Array, "n"], arcs: Num[Array, "n"], off: Float[Array, "n"]) -> PhaseLanes:
+    """Phase beside the middle of a block, by the polynomial piece of the middle."""
     tau, terms = middle.tau + off, middle.terms
     a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
-    return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+    return PhaseLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
-def reach(
+def ellipse_bounds(
     segment: PlatformSegment,
     arcs: Num[Array, "n"],
     middle: Middle,
     axes: tuple[Float[Array, "n"], Float[Array, "n"]],
     kind: PlatformMotionKind,
-) -> Reach:
+) -> EllipseBounds:
     """Bounds of motions around the middles of blocks."""
     along, aside = axes
-    sizes = _polynomial_sizes(middle.terms, along)
+    bounds = _polynomial_bounds(middle.terms, along)
     phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)
     sine, cosine = sincospi(arcs * middle.tau)
     first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), *phase)
-    speed, second_derivative = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
+    speed, second_derivative = _swing(segment, arcs, middle, (along, aside), bounds, first, kind)
     if kind.plain:
         omega = math.pi * arcs
-        beats = _Beats(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
+        betas = _RotationLaw(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
     else:
         sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
         third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
-        beats = _beat(segment, arcs, middle, (along, aside), first, third)
+        betas = _rotation_law(segment, arcs, middle, (along, aside), first, third)
     angle = jnp.abs(segment.slerp.angle)
     if kind.from_rest:
-        u, u1, u2 = (angle * size for size in sizes[:3])
+        u, u1, u2 = (angle * bound for bound in bounds[:3])
     else:
-        u, u1, u2 = _half_vector(segment, middle, (along, aside), sizes, angle)
-    beta, beta1, beta2, beta_aside = beats
+        u, u1, u2 = _half_vector(segment, middle, (along, aside), bounds, angle)
+    beta, beta1, beta2, beta_aside = betas
     v1 = beta1 * u + beta * u1
     grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
     beside = 1.0 if kind.from_rest else grown  # from rest, all rotation is about one axis
@@ -113,13 +111,13 @@ def reach(
     angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
     if not kind.from_rest:
         angular_acceleration = angular_acceleration + grown * beta * u1 * v1
-    return Reach(speed, second_derivative, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
+    return EllipseBounds(speed, second_derivative, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
 
 
-def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
+def _polynomial_bounds(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
     # Bound |A|, |A'|, |A''| and |A'''|.
-    sizes = [jnp.abs(term) for term in terms]
-    return tuple(polynomial([math.perm(i, j) * sizes[i] for i in range(j, len(sizes))], along) for j in range(4))
+    values = [jnp.abs(term) for term in terms]
+    return tuple(polynomial([math.perm(i, j) * values[i] for i in range(j, len(values))], along) for j in range(4))
 
 
 class _Trigonometric(NamedTuple):
@@ -129,7 +127,7 @@ class _Trigonometric(NamedTuple):
     aside: Array
 
 
-class _Beats(NamedTuple):
+class _RotationLaw(NamedTuple):
     # Bounds of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
     value: Array
     rate: Array
@@ -137,11 +135,11 @@ class _Beats(NamedTuple):
     aside: Array
 
 
-def _trigonometric(middle: tuple[Array, Array], along: Array, radial_rate: Array) -> _Trigonometric:
-    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the
+def _trigonometric(middle: tuple[Array, Array], along: Array, expansion: Array) -> _Trigonometric:
+    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; `expansion` is exp of the
     # largest imaginary part.
-    shrunk = 1.0 / radial_rate
-    cosh, sinh = 0.5 * (radial_rate + shrunk), 0.5 * (radial_rate - shrunk)
+    shrunk = 1.0 / expansion
+    cosh, sinh = 0.5 * (expansion + shrunk), 0.5 * (expansion - shrunk)
     near = jnp.minimum(along, 1.0)
     off = jnp.sqrt(near * near + sinh * sinh)
     sine, cosine = middle
@@ -153,18 +151,18 @@ def _trigonometric(middle: tuple[Array, Array], along: Array, radial_rate: Array
 
 
 def _swing(
-    segment: PlatformSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: PlatformMotionKind
+    segment: PlatformSegment, arcs: Array, middle: Middle, axes, bounds, first, kind: PlatformMotionKind
 ) -> tuple[Array, Array]:
-    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the growth of the frame that turns with the
+    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the norm of the frame that turns with the
     # ellipse.
     omega = math.pi * arcs
     sine, cosine, _ = first
     if kind.from_rest:
-        r, r1, r2, r3 = (jnp.abs(segment.end_radius) * size for size in sizes)
+        r, r1, r2, r3 = (jnp.abs(segment.end_radius) * bound for bound in bounds)
         nu, steady, frame = 0.0 * r, omega * omega, jnp.ones_like(r)
     else:
         span = segment.end_radius - segment.start_radius
-        r1, r2, r3 = (jnp.abs(span) * size for size in sizes[1:])
+        r1, r2, r3 = (jnp.abs(span) * bound for bound in bounds[1:])
         r = jnp.abs(segment.start_radius + span * middle.terms[0]) + axes[0] * r1
         nu = segment.precession / arcs
         steady = omega * omega * (1.0 - nu) * (1.0 + nu)
@@ -186,41 +184,41 @@ def _hypotenuse(a: Array, b: Array) -> Array:
     return jnp.sqrt(a * a + b * b)
 
 
-def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
+def _rotation_law(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _RotationLaw:
     # Bound beta_ff of (3.93) by its terms.
     slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     fraction = (1.0 - nu) * (1.0 + nu)
-    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
-    h, steep = slerp.start_beta_hat * fraction + slope * middle.tau, jnp.abs(slope)
+    h_rate = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
+    h, steep = slerp.start_beta_hat * fraction + h_rate * middle.tau, jnp.abs(h_rate)
     nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
     value = nine * first.cosine + one * third.cosine
     rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
     second_derivative = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
     second_derivative = second_derivative + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
     aside = nine * first.aside + one * third.aside + steep * axes[1] * (first.cosine + third.cosine)
-    return _Beats(value * 0.125, rate * 0.125, second_derivative * 0.125, aside * 0.125)
+    return _RotationLaw(value * 0.125, rate * 0.125, second_derivative * 0.125, aside * 0.125)
 
 
-def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
+def _half_vector(segment: PlatformSegment, middle: Middle, axes, bounds, angle: Array) -> tuple[Array, ...]:
     # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
     slerp = segment.slerp
-    rate, second_derivative = angle * sizes[1], angle * sizes[2]
+    rate, second_derivative = angle * bounds[1], angle * bounds[2]
     grown = jnp.exp(axes[1] * rate)
     shrunk = 1.0 / grown
     cosh = 0.5 * (grown + shrunk)
-    size = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
+    norm = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
     sine, cosine = sincospi(slerp.angle * middle.terms[0] / math.pi)
     largest = _hypotenuse(slerp.start[:, 0], slerp.across[:, 0]) * cosh
     off = jnp.abs(1.0 - slerp.start[:, 0] * cosine - slerp.across[:, 0] * sine) + axes[0] * rate * largest
     w, w1, w2 = _angle_ratio(jnp.maximum(off, NEAREST))
     s, s1 = jnp.minimum(1.0 + off, largest), largest
-    by_angle = size * (w + w1 * s1)
-    by_square = size * (w + 2.0 * w1 * s1 + w2 * s1 * s1 + w1 * s)
-    return size * w, by_angle * rate, by_square * rate * rate + by_angle * second_derivative
+    by_angle = norm * (w + w1 * s1)
+    by_square = norm * (w + 2.0 * w1 * s1 + w2 * s1 * s1 + w1 * s)
+    return norm * w, by_angle * rate, by_square * rate * rate + by_angle * second_derivative
 
 
 def _angle_ratio(off: Array) -> tuple[Array, ...]:
-    # Bound W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| <= off: their series in 1 - s
+    # Bound W = arccos(s) / sqrt(1 - s^2) and its derivatives where |1 - s| <= off: their series in 1 - s
     # have positive terms alone, so that they are largest on the real axis.
     is_inside = off < FARTHEST
     s = 1.0 - jnp.where(is_inside, off, 1.0)

@@ -1,4 +1,4 @@
-"""Enclosures of a platform on its path, for bounds over robots that differ a little; vectors are in platform axes."""
+"""Enclosures of a platform on its way, for bounds over robots that differ a little; vectors are in platform axes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, squared_duration, state
-from cspr_jax.families.platforms.six_cable_proof.complex_bounds import Reach, instant_beside, middle_of, reach
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import (
+    EllipseBounds,
+    ellipse_bounds,
+    middle_of,
+    phase_beside,
+)
 from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem, touchable
@@ -47,20 +51,20 @@ RADIUS = 0.4
 
 class _Moving(NamedTuple):
     # State in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
-    # about all of their instants (`wide`).
-    here: StateLanes
+    # about all of their times (`wide`).
+    state: StateLanes
     squared: Array
-    near: Reach
-    wide: Reach
+    near: EllipseBounds
+    wide: EllipseBounds
 
 
 @partial(jax.jit, static_argnames="kind")
 def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> _Moving:
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
-    current = state(segments, arcs, instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
+    current = state(segments, arcs, phase_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
     near, wide = (
-        reach(segments, arcs, middle, (half + radius, radius), kind)
+        ellipse_bounds(segments, arcs, middle, (half + radius, radius), kind)
         for radius in (jnp.zeros_like(half), RADIUS / (math.pi * arcs))
     )
     return materialized(_Moving(current, squared_duration(segments, arcs), near, wide), one)
@@ -68,8 +72,8 @@ def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) ->
 
 @partial(jax.jit, static_argnames="pairs")
 def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Array, Array, Array]:
-    # Return the places at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors (n, n_pairs, 3), and
-    # the residuals of the projections of cables onto the sectors of their corners (n, 6, 3).
+    # Return the fractions of their lengths at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors
+    # (n, n_pairs, 3), and the residuals of the projections of cables onto the sectors of their corners (n, 6, 3).
     sides, normal = platform
     one, two = ([sides[:, side, k] for k in range(3)] for side in range(2))
     left = jax.vmap(lambda ray: jnp.stack(residual((one, two), normal, -ray.T), axis=1))(rays)
@@ -82,9 +86,10 @@ def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Ar
 
 class _Middle(NamedTuple):
     # Values in the middles of k blocks, in platform axes and time: rays, their rates as the platform sees them,
-    # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass.
+    # velocity and acceleration of the attachment points (k, 6, 3); force and moment (k, 3) per
+    # mass, acceleration matrix (k, 3, 3).
     rays: np.ndarray
-    pace: np.ndarray
+    ray_rate: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
     force: np.ndarray
@@ -93,9 +98,9 @@ class _Middle(NamedTuple):
 
 
 class _Within(NamedTuple):
-    # Changes of the rays along their tangents up to the stops of k blocks (k, 6, 3), and bounds of changes within these
+    # Changes of the rays along their tangents up to the ends of k blocks (k, 6, 3), and bounds of changes within these
     # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
-    # force and whirl (k,).
+    # force and acceleration matrix (k,).
     tangent: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
@@ -105,10 +110,10 @@ class _Within(NamedTuple):
     acceleration_matrix: np.ndarray
 
 
-def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
-    vectors = here.position, here.velocity, here.acceleration, here.omega, here.angular_acceleration
+def _middle(robot: PlatformRobot, current: StateLanes, squared: np.ndarray) -> _Middle:
+    vectors = current.position, current.velocity, current.acceleration, current.omega, current.angular_acceleration
     position, velocity, acceleration, omega, angular_acceleration = (np.stack(x, axis=1) for x in vectors)
-    rotation = np.stack([np.stack(row, axis=1) for row in here.rotation], axis=1)
+    rotation = np.stack([np.stack(row, axis=1) for row in current.rotation], axis=1)
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
 
     def in_platform(vectors: np.ndarray) -> np.ndarray:
@@ -145,7 +150,7 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     # Bound changes in real time by `near`; where a derivative has no bound, by Cauchy's inequality from values on
     # discs.
     near, wide, squared = (
-        *(Reach(*(x[:, None] for x in y)) for y in (moving.near, moving.wide)),
+        *(EllipseBounds(*(x[:, None] for x in y)) for y in (moving.near, moving.wide)),
         moving.squared[:, None],
     )
     half, radius, time = half[:, None], RADIUS / (math.pi * arcs[:, None]), np.sqrt(squared)
@@ -154,16 +159,16 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     jerk = wide.second_derivative / radius
     force = jerk / squared + near.omega * (near.second_derivative / squared + float(robot.gravity))
     acceleration_matrix = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
-    pace = near.speed + arms * near.omega
+    tip_velocity = near.speed + arms * near.omega
     turning = near.angular_acceleration + near.omega**2
-    pull = near.second_derivative + arms * turning
-    steep = jerk + arms * wide.radial_rate * (wide.angular_acceleration + wide.omega**2) / radius
+    tip_acceleration = near.second_derivative + arms * turning
+    tip_jerk = jerk + arms * wide.rotation_norm * (wide.angular_acceleration + wide.omega**2) / radius
     deviation = 0.5 * half**2 * (near.second_derivative + 2.0 * near.omega * near.speed + turning * away)
-    tangent = middle.pace * (half * time)[..., None]
+    tangent = middle.ray_rate * (half * time)[..., None]
     return _Within(
         tangent,
-        half * (pull + near.omega * pace) / time,
-        half * (steep + near.omega * pull) / squared,
+        half * (tip_acceleration + near.omega * tip_velocity) / time,
+        half * (tip_jerk + near.omega * tip_acceleration) / squared,
         deviation,
         largest_moves(tangent, deviation),
         *(half * x for x in (force, acceleration_matrix)),
@@ -176,61 +181,64 @@ class _Columns:
     def __init__(self, count: int) -> None:
         self._count, self._columns = count, list[tuple]()
 
-    def add(self, bound, change, spools: float, here, here_spools, tilted=(0.0, 0.0, 0.0)) -> None:
-        self._columns.append((bound, change, *tilted, here, here_spools, spools))
+    def add(self, bound, change, spools: float, current, current_loss, tilted=(0.0, 0.0, 0.0)) -> None:
+        self._columns.append((bound, change, *tilted, current, current_loss, spools))
 
     def distances(self) -> Distances:
         *each, spools = zip(*self._columns, strict=True)
-        bound, change, tilt, slope, swing, current, here_spools = (
+        bound, change, tilt, tilt_norm, swing, current, current_loss = (
             np.stack([np.broadcast_to(x, self._count) for x in column], axis=1) for column in each
         )
-        return Distances(bound, change, tilt, slope, swing, np.array(spools), current, here_spools)
+        return Distances(bound, change, tilt, tilt_norm, swing, np.array(spools), current, current_loss)
 
 
 def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within, met) -> Distances:
-    robot, (places, gaps, left) = problem.robot, met
+    robot, (fractions, gaps, left) = problem.robot, met
     columns, tips = _Columns(len(middle.rays)), np.asarray(robot.platform_points)
     for n, pair in enumerate(pairs):
-        _add_gap(columns, gaps[:, n], places[:, n], middle, within, tips, pair)
+        _add_gap(columns, gaps[:, n], fractions[:, n], middle, within, tips, pair)
     for k in range(CABLES):
         e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
         change = np.abs(np.sum(e * within.tangent[:, k], axis=1)) + within.deviation[:, k]
         columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
     longest = touchable(problem).limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
-        room = length - np.linalg.norm(middle.rays[:, k], axis=1)
-        columns.add(room, within.moved[:, k], 1.0, room, 1.0)
+        slack = length - np.linalg.norm(middle.rays[:, k], axis=1)
+        columns.add(slack, within.moved[:, k], 1.0, slack, 1.0)
     return columns.distances()
 
 
-def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
+def _add_gap(columns: _Columns, gaps, fractions, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
     # Add the distance of two cables, by the four pairs of their ends: seen from the platform only the spools move.
     i, j = pair
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
-    tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
-    slope = np.linalg.norm(tilt, axis=1)
+    tilt = _tilted(middle.rays[:, i], middle.rays[:, j], fractions)
+    tilt_norm = np.linalg.norm(tilt, axis=1)
     along = [np.sum(e * within.tangent[:, k], axis=1) for k in pair]
     for first, last in itertools.product((1.0, 0.0), repeat=2):
-        apart = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
+        separation = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
         change = (
             np.abs(first * along[0] - last * along[1]) + first * within.deviation[:, i] + last * within.deviation[:, j]
         )
-        swing = slope * (first * within.moved[:, i] + last * within.moved[:, j])
-        tilted = np.sum(tilt * apart, axis=1), slope, swing
-        columns.add(np.sum(e * apart, axis=1), change, first + last, gap, 2.0 - places.sum(1), tilted)
+        swing = tilt_norm * (first * within.moved[:, i] + last * within.moved[:, j])
+        tilted = np.sum(tilt * separation, axis=1), tilt_norm, swing
+        columns.add(np.sum(e * separation, axis=1), change, first + last, gap, 2.0 - fractions.sum(1), tilted)
 
 
-def _tilted(first: np.ndarray, last: np.ndarray, places: np.ndarray) -> np.ndarray:
+def _tilted(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) -> np.ndarray:
     # Return vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are
     # nearest between their ends; there both cables are normal to the shortest vector.
-    ways = np.stack([first, -last], axis=1)
-    inner = (places > INSIDE) & (places < 1.0 - INSIDE)
-    gram = np.einsum("kia,kja->kij", ways, ways) * inner[:, :, None] * inner[:, None] + np.eye(2) * ~inner[:, None]
+    directions = np.stack([first, -last], axis=1)
+    inner = (fractions > INSIDE) & (fractions < 1.0 - INSIDE)
+    gram = (
+        np.einsum("kia,kja->kij", directions, directions) * inner[:, :, None] * inner[:, None]
+        + np.eye(2) * ~inner[:, None]
+    )
     determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] ** 2
     is_regular = determinant > PARALLEL * gram[:, 0, 0] * gram[:, 1, 1]
     safe = np.where(is_regular[:, None, None], gram, np.eye(2))
     weight = np.linalg.solve(safe, (1.0 * inner)[..., None])[..., 0] * (inner & is_regular[:, None])
-    return np.einsum("ki,kia->ka", weight, ways)
+    return np.einsum("ki,kia->ka", weight, directions)
 
 
 class Robustness:
@@ -239,18 +247,18 @@ class Robustness:
     Args:
         problem: robot, limits with an uncertainty, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: called with the number of instants that were looked at.
+        count_samples: called with the number of samples that were computed.
     """
 
     def __init__(
-        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
         """Find which cables can meet each other or the platform."""
         self._problem, self._kind, self._batch = problem, kind, batch
         near = contacts(problem.robot)
         self._pairs = tuple((int(i), int(j)) for i, j in near.pairs)
         self._platform = near.sides, near.normal
-        self._certifier = Certifier(problem, kind, batch=batch, count_instants=count_instants)
+        self._certifier = Certifier(problem, kind, batch=batch, count_samples=count_samples)
         self._knots = np.asarray(problem.amplitude.knots)
 
     def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, full: bool = True) -> Tolerated:
@@ -262,11 +270,11 @@ class Robustness:
     def enclosure(self, segments: PlatformSegment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
         """Enclosure of blocks of motions."""
         problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
-        items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop
+        items = take_segments(segments, blocks.row), block_arcs, blocks.start, blocks.stop
         kernel = partial(_moving, problem, np.ones(()), kind=self._kind)
         moving = in_batches(kernel, items, batch_size=self._batch)
         half = 0.5 * (blocks.stop - blocks.start)
-        middle = _middle(problem.robot, moving.here, moving.squared)
+        middle = _middle(problem.robot, moving.state, moving.squared)
         within = _within(problem.robot, middle, moving, half, block_arcs)
         points = np.asarray(problem.robot.platform_points)
         touching = partial(_contacts, self._platform, points, pairs=self._pairs)

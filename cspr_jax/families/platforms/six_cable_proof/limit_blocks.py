@@ -30,8 +30,8 @@ STRAIGHT = 0.414
 Pair = tuple[Array, Array]
 
 
-class Here(NamedTuple):
-    """One instant of each of n blocks.
+class Node(NamedTuple):
+    """One node of each of n blocks.
 
     Fields:
         state: of the platform.
@@ -48,14 +48,14 @@ class Here(NamedTuple):
     z0: Array
 
 
-class Sizes(NamedTuple):
+class CableBounds(NamedTuple):
     """Bounds on an ellipse of complex time, one (n,) a cable.
 
     Fields:
         kappa: bounds of the numerators of the slacks of taut cables.
         rays: bounds of lengths, m.
-        paces: bounds of the derivative of rays in normalised time, m.
-        pulls: bounds of the second derivative of rays, m.
+        ray_rates: bounds of the derivative of rays in normalised time, m.
+        ray_accelerations: bounds of the second derivative of rays, m.
         is_straight: whether lengths are analytic.
         squared: (n,) T^2, s^2.
         z0: (n,) depth of P0, m.
@@ -65,8 +65,8 @@ class Sizes(NamedTuple):
 
     kappa: Sequence[Array]
     rays: Sequence[Array]
-    paces: Sequence[Array]
-    pulls: Sequence[Array]
+    ray_rates: Sequence[Array]
+    ray_accelerations: Sequence[Array]
     is_straight: Sequence[Array]
     squared: Array
     z0: Array
@@ -95,15 +95,15 @@ class LimitOnBlocks(NamedTuple):
 
     Fields:
         width: number of values that stand for the quantity.
-        values: takes an instant and the limit (n_cables,); gives the values in pairs of (n,).
-        sizes: takes `Sizes` and the limit; gives a bound of the size of each value.
-        slacks: takes the enclosed values, the limit over the scale of slacks, and whether the limit is a least value;
+        values: takes a node and the limit (n_cables,); gives the values in pairs of (n,).
+        bounds: takes `CableBounds` and the limit; gives a bound of the magnitude of each value.
+        slacks: takes the enclosed values, the limit over the scale of slacks, and whether the limit is a lower one;
             gives upper bounds of the smallest slacks at the nodes (m, n), and a lower bound of all slacks (n,).
     """
 
     width: int
-    values: Callable[[Here, Array], list[Pair]]
-    sizes: Callable[[Sizes, Array], list[Array]]
+    values: Callable[[Node, Array], list[Pair]]
+    bounds: Callable[[CableBounds, Array], list[Array]]
     slacks: Callable[[Enclosed, Array, bool], Pair]
 
 
@@ -123,43 +123,43 @@ def _paired(values: Sequence[Array]) -> list[Pair]:
     return list(zip(values[::2], values[1::2], strict=True))
 
 
-def _tensions(here: Here, _: Array) -> list[Pair]:
-    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.cables.rays]
-    return _paired([x * length for x, length in zip(here.kappa, lengths, strict=True)])
+def _tensions(node: Node, _: Array) -> list[Pair]:
+    lengths = [jnp.sqrt(dot(ray, ray)) / node.z0 for ray in node.cables.rays]
+    return _paired([x * length for x, length in zip(node.kappa, lengths, strict=True)])
 
 
-def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
-    each = zip(sizes.kappa, sizes.rays, sizes.is_straight, strict=True)
-    return [jnp.where(is_straight, kappa * ray / sizes.z0, jnp.inf) for kappa, ray, is_straight in each]
+def _tension_bounds(cable: CableBounds, _: Array) -> list[Array]:
+    each = zip(cable.kappa, cable.rays, cable.is_straight, strict=True)
+    return [jnp.where(is_straight, kappa * ray / cable.z0, jnp.inf) for kappa, ray, is_straight in each]
 
 
-def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
+def _tension_slacks(enclosed: Enclosed, limit: Array, is_lower: bool) -> Pair:
     limit, (low, high), (under, over) = limit[None, :, None], enclosed.coefficients, enclosed.nodes
-    if is_least:
+    if is_lower:
         current, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
     else:
         current, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
     return jnp.min(current, axis=1), jnp.min(bound, axis=(0, 1))
 
 
-def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
-    state = here.state
-    rows = cable_rates(here.cables, state.velocity, state.acceleration, state.omega, state.angular_acceleration)
-    return list(zip(*rows, strict=True))
+def _rates(node: Node) -> list[tuple[Array, Array, Array]]:
+    state = node.state
+    columns = cable_rates(node.cables, state.velocity, state.acceleration, state.omega, state.angular_acceleration)
+    return list(zip(*columns, strict=True))
 
 
-def _speeds(here: Here, limit: Array) -> list[Pair]:
+def _speeds(node: Node, limit: Array) -> list[Pair]:
     values = []
-    for k, (length, rate, _) in enumerate(_rates(here)):
-        fraction = rate * rate / (here.squared * limit[k] ** 2)
-        values.append((length / here.z0) ** 2 * (1.0 - fraction))
+    for k, (length, rate, _) in enumerate(_rates(node)):
+        fraction = rate * rate / (node.squared * limit[k] ** 2)
+        values.append((length / node.z0) ** 2 * (1.0 - fraction))
     return _paired(values)
 
 
-def _speed_sizes(sizes: Sizes, limit: Array) -> list[Array]:
+def _speed_bounds(cable: CableBounds, limit: Array) -> list[Array]:
     return [
-        (ray / sizes.z0) ** 2 * (1.0 + pace**2 / (sizes.squared * limit[k] ** 2))
-        for k, (ray, pace) in enumerate(zip(sizes.rays, sizes.paces, strict=True))
+        (ray / cable.z0) ** 2 * (1.0 + rate**2 / (cable.squared * limit[k] ** 2))
+        for k, (ray, rate) in enumerate(zip(cable.rays, cable.ray_rates, strict=True))
     ]
 
 
@@ -173,23 +173,25 @@ def _of_mass_centre(vector, largest: Array) -> list[Pair]:
     return [(value, value)]
 
 
-def _mass_centre_sizes(size: Array, largest: Array) -> list[Array]:
-    return [1.0 + (size / largest) ** 2] * 2
+def _mass_centre_bounds(norm: Array, largest: Array) -> list[Array]:
+    return [1.0 + (norm / largest) ** 2] * 2
 
 
-def _accelerations(here: Here, limit: Array) -> list[Pair]:
+def _accelerations(node: Node, limit: Array) -> list[Pair]:
     pairs = []
-    for k, (length, _, second_derivative) in enumerate(_rates(here)):
-        cubed = (length / here.z0) ** 3
-        pairs.append((cubed, cubed * second_derivative / (here.squared * limit[k])))
+    for k, (length, _, second_derivative) in enumerate(_rates(node)):
+        cubed = (length / node.z0) ** 3
+        pairs.append((cubed, cubed * second_derivative / (node.squared * limit[k])))
     return pairs
 
 
-def _acceleration_sizes(sizes: Sizes, limit: Array) -> list[Array]:
+def _acceleration_bounds(cable: CableBounds, limit: Array) -> list[Array]:
     bounds = []
-    for k, (ray, pace, pull) in enumerate(zip(sizes.rays, sizes.paces, sizes.pulls, strict=True)):
-        second_derivative = ray**2 * (2.0 * pace**2 + ray * pull) / (sizes.squared * sizes.z0**3 * limit[k])
-        bounds += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), second_derivative]
+    for k, (ray, rate, acceleration) in enumerate(
+        zip(cable.rays, cable.ray_rates, cable.ray_accelerations, strict=True)
+    ):
+        second_derivative = ray**2 * (2.0 * rate**2 + ray * acceleration) / (cable.squared * cable.z0**3 * limit[k])
+        bounds += [jnp.where(cable.is_straight[k], (ray / cable.z0) ** 3, jnp.inf), second_derivative]
     return bounds
 
 
@@ -197,25 +199,25 @@ def _acceleration_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
     (low, high), (under, over) = enclosed.coefficients, enclosed.nodes
     worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
     # Take accelerations as near to zero as rounding lets them be.
-    bends = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
-    return jnp.min(over[:, ::2] - bends, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
+    accelerations = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
+    return jnp.min(over[:, ::2] - accelerations, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
 
 
 # The keys are the names of the quantities in the rows of `schema.limits`.
 QUANTITIES = {
-    "tension": LimitOnBlocks(CABLES, _tensions, _tension_sizes, _tension_slacks),
-    "speed": LimitOnBlocks(CABLES, _speeds, _speed_sizes, _speed_slacks),
-    "acceleration": LimitOnBlocks(2 * CABLES, _accelerations, _acceleration_sizes, _acceleration_slacks),
+    "tension": LimitOnBlocks(CABLES, _tensions, _tension_bounds, _tension_slacks),
+    "speed": LimitOnBlocks(CABLES, _speeds, _speed_bounds, _speed_slacks),
+    "acceleration": LimitOnBlocks(2 * CABLES, _accelerations, _acceleration_bounds, _acceleration_slacks),
     "mass_centre_speed": LimitOnBlocks(
         2,
-        lambda here, limit: _of_mass_centre(here.state.velocity, jnp.sqrt(here.squared) * limit),
-        lambda sizes, limit: _mass_centre_sizes(sizes.speed, jnp.sqrt(sizes.squared) * limit),
+        lambda node, limit: _of_mass_centre(node.state.velocity, jnp.sqrt(node.squared) * limit),
+        lambda cable, limit: _mass_centre_bounds(cable.speed, jnp.sqrt(cable.squared) * limit),
         _speed_slacks,
     ),
     "mass_centre_acceleration": LimitOnBlocks(
         2,
-        lambda here, limit: _of_mass_centre(here.state.acceleration, here.squared * limit),
-        lambda sizes, limit: _mass_centre_sizes(sizes.second_derivative, sizes.squared * limit),
+        lambda node, limit: _of_mass_centre(node.state.acceleration, node.squared * limit),
+        lambda cable, limit: _mass_centre_bounds(cable.second_derivative, cable.squared * limit),
         _speed_slacks,
     ),
 }

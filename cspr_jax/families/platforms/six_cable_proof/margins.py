@@ -20,68 +20,68 @@ class Samples(NamedTuple):
 
     Fields:
         criteria: (n_values,) their numbers.
-        row: (k,) motion of each block.
-        tau: (m, k) instants, increasing.
+        motion: (k,) motion of each block.
+        tau: (m, k) times, increasing.
         values: (m, n_values, k).
     """
 
     criteria: np.ndarray
-    row: np.ndarray
+    motion: np.ndarray
     tau: np.ndarray
     values: np.ndarray
 
 
 def narrowed(
     values_at: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    least: Float[np.ndarray, "n_criteria n"],
+    minima: Float[np.ndarray, "n_criteria n"],
     samples: Samples,
     selected: Bool[np.ndarray, "n"],
 ) -> None:
     """Narrow down the smallest values around samples."""
-    place, value, item = low_points(samples, selected)
-    if not len(place):
+    sample, value, item = low_points(samples, selected)
+    if not len(sample):
         return
-    row, criterion, tau = samples.row[item], samples.criteria[value], samples.tau[place, item]
+    motion, criterion, tau = samples.motion[item], samples.criteria[value], samples.tau[sample, item]
     last = len(samples.tau) - 1
-    beside = [np.abs(samples.tau[np.clip(place + k, 0, last), item] - tau) for k in (-1, 1)]
+    beside = [np.abs(samples.tau[np.clip(sample + k, 0, last), item] - tau) for k in (-1, 1)]
     width = np.maximum(*beside)
     for _ in range(ROUNDS):
         points = np.clip(tau[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0)
-        values = _values(values_at, least, row, points, criterion)
+        values = _values(values_at, minima, motion, points, criterion)
         tau = _vertex(points, values)
         width = width / NEARER
-    _values(values_at, least, row, tau[:, None], criterion)
+    _values(values_at, minima, motion, tau[:, None], criterion)
 
 
 def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[np.ndarray, "j"], ...]:
-    """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value."""
-    values, row = samples.values, samples.row
+    """Samples no larger than their neighbours, where a parabola of twice their curvature could be smallest."""
+    values, motion = samples.values, samples.motion
     smallest = np.full((values.shape[1], len(selected)), np.inf)
     lowest = values.min(0)
     for minimum, block_values in zip(smallest, lowest, strict=True):
-        np.minimum.at(minimum, row, block_values)
+        np.minimum.at(minimum, motion, block_values)
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
     with np.errstate(invalid="ignore"):  # infinities beside infinities
-        is_low &= (np.ptp(values, axis=0) > LEVEL) & selected[row]
-    place, value, item = np.nonzero(is_low)
-    current, last = values[place, value, item], len(values) - 1
-    before, after = (values[np.clip(place + k, 0, last), value, item] for k in (-1, 1))
+        is_low &= (np.ptp(values, axis=0) > LEVEL) & selected[motion]
+    sample, value, item = np.nonzero(is_low)
+    current, last = values[sample, value, item], len(values) - 1
+    before, after = (values[np.clip(sample + k, 0, last), value, item] for k in (-1, 1))
     with np.errstate(invalid="ignore"):
         second_derivative = before - 2.0 * current + after
-    reaches = np.isfinite(second_derivative) & (current - 0.25 * second_derivative <= smallest[value, row[item]])
-    return place[reaches], value[reaches], item[reaches]
+    reaches = np.isfinite(second_derivative) & (current - 0.25 * second_derivative <= smallest[value, motion[item]])
+    return sample[reaches], value[reaches], item[reaches]
 
 
-def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, criterion: np.ndarray):
+def _values(values_at: Callable, minima: np.ndarray, motion: np.ndarray, points: np.ndarray, criterion: np.ndarray):
     # Return values (j, m) of each candidate's own criterion; the smallest values of all criteria are lowered.
     count = points.shape[1]
-    rows = np.repeat(row, count)
-    attained = values_at(rows, points.ravel())
-    for lowest, values in zip(least, attained, strict=True):
-        np.fmin.at(lowest, rows, values)
-    return attained[np.repeat(criterion, count), np.arange(len(rows))].reshape(points.shape)
+    motions = np.repeat(motion, count)
+    attained = values_at(motions, points.ravel())
+    for lowest, values in zip(minima, attained, strict=True):
+        np.fmin.at(lowest, motions, values)
+    return attained[np.repeat(criterion, count), np.arange(len(motions))].reshape(points.shape)
 
 
 def _vertex(points: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,11 +1,11 @@
 """Bounds of contacts, depth and limits on the pose, which depend on the pose alone, on blocks of a platform's motions.
 
-Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: this is linear in the
-points, so that the ends of the cables are enough. A cable is off the platform where its vector v from its corner, in
-platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole
+Two cables are separated where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: this is linear in
+the points, so that the ends of the cables are enough. A cable is off the platform where its vector v from its corner,
+in platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole
 block. The e of the middle is taken: along the shortest vector between the cables, or along the residual of the
-projection of the cable onto the sector (Moreau).
-Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
+projection of the cable onto the sector (Moreau). Between times h apart a function f with |f''| <= C stays above its
+smaller end less C h^2 / 8.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from jax import Array, lax
 
 from cspr_jax.families.platforms.platform_segment import PlatformSegment
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, state
-from cspr_jax.families.platforms.six_cable_proof.complex_bounds import instant_beside, middle_of, reach
-from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import ellipse_bounds, middle_of, phase_beside
+from cspr_jax.families.platforms.six_cable_proof.work_list import smallest_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
@@ -34,37 +34,37 @@ from cspr_jax.schema.limits import Limit
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Steps of a block, and the instants at their ends.
+# Steps of a block, and the times at their ends, from -1 to 1.
 STEPS = 4
-PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
-# Lengths and heights may be wrong by this part of the size of coordinates.
+OFFSETS = np.linspace(-1.0, 1.0, STEPS + 1)
+# Lengths and heights may be wrong by this part of the largest coordinate.
 POSE_ERROR = 1e-13
 TINY = 1e-30
 
 
-class PlaceBounds(NamedTuple):
+class PoseBounds(NamedTuple):
     """Bounds and attained values of n blocks.
 
     Fields:
         clear: (n,) lower bound of the distances between cables that can meet, and of the distances of cables from the
             sectors of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
-        nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
-            cables, m. Without margins the least of each: (1, n_criteria + 1, n).
-        place: (n,) place of the smallest of the least slacks, from -1 to 1; 0 with margins.
-        bends: (3, n) C h^2 / 8, by which motions between two instants may depart from the chord: of the mass centre, m;
-            of a point of the platform beside it, over its distance; of vectors as the platform sees them, m.
+        nodes: (n_instants, n_criteria + 1, n) attained slacks at times a step apart; the smallest distance between
+            cables, m. Without margins the smallest of each: (1, n_criteria + 1, n).
+        offset: (n,) where in the block the smallest of these slacks is, from -1 to 1; 0 with margins.
+        deviations: (3, n) C h^2 / 8, by which motions between two times may depart from the chord: of the mass centre,
+            m; of a point of the platform beside it, over its distance; of vectors as the platform sees them, m.
     """
 
     clear: Array
     slacks: Array
     nodes: Array
-    place: Array
-    bends: Array
+    offset: Array
+    deviations: Array
 
 
-class _Bends(NamedTuple):
-    # Departures (n,) from the chord between two instants, C h^2 / 8: of the centre, m; of an arm of unit length; of
+class _Deviations(NamedTuple):
+    # Deviations (n,) from the chord between two times, C h^2 / 8: of the centre, m; of an arm of unit length; of
     # vectors seen from the platform, m.
     centre: Array
     arm: Array
@@ -72,26 +72,26 @@ class _Bends(NamedTuple):
 
 
 def of_pose(problem: Problem) -> list[Limit]:
-    """Rows of the limits on the pose that are set."""
-    return [row for row in limits_set(problem.limits) if not row.of_motion]
+    """The limits on the pose that are set."""
+    return [limit for limit in limits_set(problem.limits) if not limit.of_motion]
 
 
 @persistent_jit(static_argnames=("pairs", "kind", "margins"))
-def place_blocks(
+def pose_blocks(
     problem: Problem, platform, one: Float[Array, ""], items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
-) -> PlaceBounds:
+) -> PoseBounds:
     """Bounds on blocks."""
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
 
     def at(off):
-        return state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
+        return state(segments, arcs, phase_beside(middle, segments.sense, arcs, off * half), kind, one)
 
-    bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
+    bounds = ellipse_bounds(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     fraction = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.angular_acceleration + bounds.omega**2
-    instant = materialized(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
-    current = state(segments, arcs, instant, kind, one)
+    phase = materialized(phase_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
+    current = state(segments, arcs, phase, kind, one)
     position, rotation = materialized((current.position, current.rotation), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
@@ -101,15 +101,17 @@ def place_blocks(
         + bounds.second_derivative
         + 2.0 * bounds.omega * bounds.speed
     )
-    bends = materialized(_Bends(bounds.second_derivative * fraction, turning * fraction, seen * fraction), one)
+    deviations = materialized(
+        _Deviations(bounds.second_derivative * fraction, turning * fraction, seen * fraction), one
+    )
     gaps, left = _separators(problem.robot, platform, pairs, (position, rotation), one)
 
-    def on(place):
-        pose = at(place)
+    def on(offset):
+        pose = at(offset)
         cables = cable_lanes(problem.robot, pose.position, pose.rotation)
-        apart = _apart(problem.robot, pairs, gaps, cables, bends)
+        separation = _separation(problem.robot, pairs, gaps, cables, deviations)
         away = zip(left, interference_lanes.cable_directions(cables, pose.rotation), strict=True)
-        clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
+        clear = jnp.minimum(separation, smallest([dot(e, v) for e, v in away]) - deviations.seen)
         values = _slacks(problem, segments, pose, cables)
         if margins and pairs:
             squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
@@ -117,22 +119,22 @@ def place_blocks(
         # Pack two real numbers into one complex number, so that one loop computes both.
         return lax.complex(clear, values[0]), *values[1:]
 
-    first, *others = lax.map(on, PLACES)
+    first, *others = lax.map(on, OFFSETS)
     nodes = [jnp.imag(first), *others]
     if not (margins and pairs):
         nodes.append(jnp.full_like(nodes[0], jnp.inf))
-    steps = _steps(problem, segments, bends)
+    steps = _steps(problem, segments, deviations)
     if margins:
-        attained, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
+        attained, offset = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
     else:
-        attained, place = least_nodes(nodes, len(nodes) - 1, PLACES)
-    size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.center[:, 2]
-    return PlaceBounds(
-        jnp.min(jnp.real(first), axis=0) - POSE_ERROR * size,
+        attained, offset = smallest_nodes(nodes, len(nodes) - 1, OFFSETS)
+    extent = jnp.max(jnp.abs(problem.robot.base_points)) + segments.center[:, 2]
+    return PoseBounds(
+        jnp.min(jnp.real(first), axis=0) - POSE_ERROR * extent,
         jnp.stack([jnp.min(x, axis=0) - step - POSE_ERROR for x, step in zip(nodes[:-1], steps, strict=True)]),
         attained,
-        place,
-        jnp.stack(bends),
+        offset,
+        jnp.stack(deviations),
     )
 
 
@@ -150,8 +152,8 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
     if not pairs:
         return [], left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
-    apart = [x[j] - x[i] for x in base]
-    return _units(interference_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
+    between = [x[j] - x[i] for x in base]
+    return _units(interference_lanes.gap(between, [x[i] for x in rays], [x[j] for x in rays])), left
 
 
 def _units(vectors: Vector) -> list[Vector]:
@@ -161,11 +163,13 @@ def _units(vectors: Vector) -> list[Vector]:
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
 
 
-def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: CableLanes, bends: _Bends) -> Array:
-    # Return the least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
+def _separation(
+    robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: CableLanes, deviations: _Deviations
+) -> Array:
+    # Return the minimum over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
     if not pairs:
-        return jnp.full_like(bends.centre, jnp.inf)
-    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+        return jnp.full_like(deviations.centre, jnp.inf)
+    arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     values = []
     for (i, j), e in zip(pairs, gaps, strict=True):
         first, last = dot(e, cables.rays[i]), dot(e, cables.rays[j])
@@ -173,42 +177,42 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: Cable
         between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
         values += [
             spools,
-            spools + last - bends.centre - sizes[j] * bends.arm,
-            spools - first - bends.centre - sizes[i] * bends.arm,
-            spools + last - first - between * bends.arm,
+            spools + last - deviations.centre - arms[j] * deviations.arm,
+            spools - first - deviations.centre - arms[i] * deviations.arm,
+            spools + last - first - between * deviations.arm,
         ]
     return smallest(values)
 
 
-def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, cables: CableLanes) -> list[Array]:
+def _slacks(problem: Problem, segments: PlatformSegment, current: StateLanes, cables: CableLanes) -> list[Array]:
     # Return the slacks of the depth below the spools, and of limits on the pose.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     normal = plane_normal(robot)
-    values = [dot([normal[i] for i in range(3)], here.position) / z0]
-    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
-    for row in of_pose(problem):
-        limit = getattr(problem.limits, row.name)
-        if row.quantity == "depth":
+    values = [dot([normal[i] for i in range(3)], current.position) / z0]
+    factor, unit = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    for limit in of_pose(problem):
+        allowed = getattr(problem.limits, limit.name)
+        if limit.quantity == "depth":
             attached = [ray[2] + robot.base_points[k, 2] for k, ray in enumerate(cables.rays)]
-            values.append((limit - largest([here.position[2], *attached])) * factor / size)
+            values.append((allowed - largest([current.position[2], *attached])) * factor / unit)
         else:
-            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(cables.rays)]))
+            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / allowed[k] for k, ray in enumerate(cables.rays)]))
     return values
 
 
-def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[Array]:
-    # Bound how far the slacks of `_slacks` may fall below their values at two instants; a length is convex along the
+def _steps(problem: Problem, segments: PlatformSegment, deviations: _Deviations) -> list[Array]:
+    # Bound how far the slacks of `_slacks` may fall below their values at two times; a length is convex along the
     # chord of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
-    steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
-    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * deviations.centre / z0]
+    factor, unit = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
     arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
-    for row in of_pose(problem):
-        limit = getattr(problem.limits, row.name)
-        if row.quantity == "depth":
-            # The mass centre swings in a plane: on level ways it keeps its depth.
+    for limit in of_pose(problem):
+        allowed = getattr(problem.limits, limit.name)
+        if limit.quantity == "depth":
+            # The mass centre swings in a plane: on level paths it keeps its depth.
             steep = jnp.sqrt(jnp.sum(segments.plane[:, 2] ** 2, axis=1))
-            steps.append((steep * bends.centre + jnp.max(arms) * bends.arm) * factor / size)
+            steps.append((steep * deviations.centre + jnp.max(arms) * deviations.arm) * factor / unit)
         else:
-            steps.append(largest([(bends.centre + arms[k] * bends.arm) / limit[k] for k in range(CABLES)]))
+            steps.append(largest([(deviations.centre + arms[k] * deviations.arm) / allowed[k] for k in range(CABLES)]))
     return steps

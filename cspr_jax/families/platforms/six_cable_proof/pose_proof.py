@@ -1,7 +1,7 @@
 """Proofs about contacts, depth and limits on the pose, which depend on a platform's pose alone.
 
 A motion is clear if all of its blocks are clear (`place_blocks`). It has a contact if two cables, or a cable and the
-platform, are proved to meet between two instants (`meetings`). Else, after many halvings, it is undecided.
+platform, are proved to meet between two times (`cable_contacts`). Else, after many halvings, it is undecided.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ import jax
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
 from cspr_jax.families.platforms.platform_segment_lanes import state
 from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep, cables_hit, cables_meet
-from cspr_jax.families.platforms.six_cable_proof.complex_bounds import instant_beside, middle_of
-from cspr_jax.families.platforms.six_cable_proof.pose_blocks import PLACES, PlaceBounds, of_pose, place_blocks
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import middle_of, phase_beside
+from cspr_jax.families.platforms.six_cable_proof.pose_blocks import OFFSETS, PoseBounds, of_pose, pose_blocks
 from cspr_jax.families.platforms.six_cable_proof.work_list import LIMITS_UNDECIDED, BlockBounds, WorkList
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem, touchable
@@ -38,26 +37,26 @@ if TYPE_CHECKING:
 # where a platform moves fastest.
 PARTS = 8
 FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
-TOUCH = 1e-9  # nearer than this part of the platform's size is undecided
-# After so many halvings a meeting is looked for; and places of the instants halfway between those of a block.
+TOUCH = 1e-9  # nearer than this part of the platform's radius is undecided
+# After so many halvings contacts are searched for; and the times halfway between those of a block, from -1 to 1.
 NEAR_CONTACT = 5
-MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
+MIDDLES = 0.5 * (OFFSETS[1:] + OFFSETS[:-1])
 
 
 @dataclasses.dataclass(frozen=True)
-class PlaceProof:
+class PoseProof:
     """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are set.
 
     Fields:
-        is_proved: (n,) whether there is no contact, and every criterion is met, at every instant.
-        is_refuted: (n,) whether there is a contact, or a criterion is broken at an instant.
+        is_proved: (n,) whether there is no contact, and every criterion is met, at every time.
+        is_refuted: (n,) whether there is a contact, or a criterion is broken at some time.
         met: (n,) whether two cables meet.
         hit: (n,) whether a cable lies on the platform.
-        attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
+        attained: (n, n_criteria + 1) smallest slacks at the samples, and smallest distance between cables.
         bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
-        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step with a contact; NaN where
-            there is neither.
-        row: (k,) motion of each of the first blocks.
+        refuted_tau: (n,) tau at which a criterion is broken by most, or in the middle of a step with a contact; NaN
+            where there is neither.
+        motion: (k,) motion of each of the first blocks.
         first: bounds of the first blocks.
     """
 
@@ -67,8 +66,8 @@ class PlaceProof:
     hit: np.ndarray
     attained: np.ndarray
     bound: np.ndarray
-    instant: np.ndarray
-    row: np.ndarray
+    refuted_tau: np.ndarray
+    motion: np.ndarray
     first: BlockBounds
 
 
@@ -76,31 +75,31 @@ class PlaceProof:
 def cables_beside(
     problem: Problem, items, *, kind: PlatformMotionKind
 ) -> tuple[Float[Array, "n n_cables 3"], Float[Array, "n n_cables 3"]]:
-    """Cables at one instant beside the middle of each of many blocks."""
+    """Cables at one time beside the middle of each of many blocks."""
     segments, arcs, middles, off = items
-    instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
-    current = state(segments, arcs, instant, kind)
+    phase = phase_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
+    current = state(segments, arcs, phase, kind)
     cables = cable_lanes(problem.robot, current.position, current.rotation)
     return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, current.rotation))
 
 
-class PlaceCertifier:
+class PoseCertifier:
     """Certifier of contacts, depth and limits on the pose along motions of one robot on six cables.
 
     Args:
         problem: robot, limits, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: called with the number of instants that were looked at.
+        count_samples: called with the number of samples that were computed.
 
     Fields:
         pairs: cables that can meet.
     """
 
     def __init__(
-        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
         """Find which cables can meet each other or the platform."""
-        self._problem, self._kind, self._batch, self._count = touchable(problem), kind, batch, count_instants
+        self._problem, self._kind, self._batch, self._count = touchable(problem), kind, batch, count_samples
         near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
         self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
         self._near, self._arms = near, np.linalg.norm(points, axis=1)
@@ -115,7 +114,7 @@ class PlaceCertifier:
         *,
         margins: bool = False,
         ignored: Bool[np.ndarray, "n_criteria"] | None = None,
-    ) -> PlaceProof:
+    ) -> PoseProof:
         """Prove motions, or refute them."""
         blocks, work = (
             parts_of_arcs(arcs, self._knots, self._parts[not margins]),
@@ -123,13 +122,13 @@ class PlaceCertifier:
         )
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
-        def look(part: Blocks, level: int) -> BlockBounds:
+        def bounds_of(part: Blocks, level: int) -> BlockBounds:
             bounds = self._bounds(part, segments, arcs, margins=margins)
             is_clear = np.asarray(bounds.clear) > touch
             doubtful = np.flatnonzero(~is_clear)
             if level >= NEAR_CONTACT and len(doubtful):
                 doubtful_blocks = part.part(doubtful)
-                cables = self._cables(doubtful_blocks, np.asarray(bounds.bends)[:, doubtful], (segments, arcs))
+                cables = self._cables(doubtful_blocks, np.asarray(bounds.deviations)[:, doubtful], (segments, arcs))
                 base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.times(MIDDLES[:, None])
                 for flag, step in (
                     (met, cables_meet(base, self._near.pairs, cables)),
@@ -139,18 +138,18 @@ class PlaceCertifier:
                     flag[doubtful_blocks.row[meeting]] = True
                     work.refute(doubtful_blocks.row[meeting], between[step[meeting], meeting])
             nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.slacks)
-            tau = part.times(PLACES[:, None] if margins else np.asarray(bounds.place)[None])
+            tau = part.times(OFFSETS[:, None] if margins else np.asarray(bounds.offset)[None])
             return BlockBounds(nodes, bound, tau, lambda _: is_clear)
 
-        first = work.work_off(blocks, look)
+        first = work.run(blocks, bounds_of)
         is_proved = ~work.is_refuted & ~work.is_stuck
-        known = work.attained, work.bound, work.instant
-        return PlaceProof(is_proved, work.is_refuted, met, hit, *known, blocks.row, first)
+        results = work.attained, work.bound, work.refuted_tau
+        return PoseProof(is_proved, work.is_refuted, met, hit, *results, blocks.row, first)
 
-    def _bounds(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
-        self._count(len(blocks.row) * len(PLACES))
+    def _bounds(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool) -> PoseBounds:
+        self._count(len(blocks.row) * len(OFFSETS))
         kernel = partial(
-            place_blocks,
+            pose_blocks,
             self._problem,
             (self._near.sides, self._near.normal),
             np.ones(()),
@@ -158,16 +157,21 @@ class PlaceCertifier:
             kind=self._kind,
             margins=margins,
         )
-        items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
+        items = (take_segments(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
         return in_batches(kernel, items, batch_size=self._batch, axis=-1)
 
-    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> CablesOfStep:
-        # Return the cables at the instants of blocks.
+    def _cables(self, blocks: Blocks, deviations: np.ndarray, motions) -> CablesOfStep:
+        # Return the cables at the times of blocks.
         segments, arcs = motions
-        block = np.tile(np.arange(len(blocks.row)), len(PLACES))
-        row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
-        items = rows(segments, row), arcs[row].astype(float), middle, blocks.times(PLACES[:, None]).ravel() - middle
+        block = np.tile(np.arange(len(blocks.row)), len(OFFSETS))
+        motion, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
+        items = (
+            take_segments(segments, motion),
+            arcs[motion].astype(float),
+            middle,
+            blocks.times(OFFSETS[:, None]).ravel() - middle,
+        )
         vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, batch_size=self._batch)
-        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
-        centre, arm, platform = bends
+        rays, seen = (x.reshape(len(OFFSETS), len(blocks.row), *x.shape[1:]) for x in vectors)
+        centre, arm, platform = deviations
         return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

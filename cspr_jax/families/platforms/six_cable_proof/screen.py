@@ -1,8 +1,7 @@
-"""The first look at many motions of a platform: instants that refute most of them.
+"""A cheap test of many motions of a platform: samples that refute most of them.
 
-Samples are computed in float32, which costs half; the instant with the smallest tension is then computed in float64.
-So the first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full
-anyway.
+Samples are computed in float32, which costs half; the one with the smallest tension is then computed in float64. So the
+screen refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
 """
 
 from __future__ import annotations
@@ -18,10 +17,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.families.platforms.from_rest_lanes import rest_table, swing, swings
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
-from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes
-from cspr_jax.families.platforms.six_cable_proof.slack_lanes import certain_tension, lowest_tension
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
+from cspr_jax.families.platforms.platform_segment_lanes import phase_lanes
+from cspr_jax.families.platforms.six_cable_proof.slacks import certain_tension, lowest_tension
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.batches import device_batch_size, in_batches, row_by_row
@@ -33,7 +31,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Int, Num
 
-# Instants of one call; how many times more motions are looked at than checked at a time; and the part of a batch up to
+# Samples of one call; how many times more motions are screened than checked at a time; and the part of a batch up to
 # which motions count as few.
 CHUNK, FIRST, FEWER = 8, 2, 8
 
@@ -49,18 +47,18 @@ def smallest_tensions(
     kind: PlatformMotionKind,
     single_precision: bool = False,
 ) -> tuple[Float[Array, "n"], Int[Array, "n"]]:
-    """Smallest normalised tension of many segments over some instants."""
+    """Smallest normalised tension of many segments over some samples."""
     if single_precision:
-        robot, segments = _of_one_size(robot, segments)
+        robot, segments = _in_units_of_spread(robot, segments)
     cast = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
     robot, segments, number = cast((robot, segments, jnp.asarray(arcs)))
     if kind.from_rest:
         at, table = _from_rest(robot, segments), cast(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = cast(jax.vmap(lambda t: instant_lanes(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+        table = cast(jax.vmap(lambda t: phase_lanes(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
-        def at(instant_lanes):
-            return lowest_tension(robot, segments, number, instant_lanes, kind)
+        def at(phase):
+            return lowest_tension(robot, segments, number, phase, kind)
 
     # The loop returns one number: with several, XLA would compute the tension once for each of them.
     values = row_by_row(at, table)
@@ -68,9 +66,9 @@ def smallest_tensions(
     return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
 
-def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
+def _in_units_of_spread(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
     # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
-    # eighteenth order, for which float32 has no room. Tensions over their value at rest do not depend on the unit.
+    # eighteenth order, which overflow float32. Tensions over their value at rest do not depend on the unit.
     unit = jnp.sqrt(jnp.mean(robot.base_points**2))
     smaller = dataclasses.replace(
         robot,
@@ -118,36 +116,36 @@ def _rough_and_certain(
     *,
     kind: PlatformMotionKind,
 ) -> tuple[Array, Array]:
-    # Compute `smallest_tensions` in float32, and the tension at its instant in float64, (n,) each.
+    # Compute `smallest_tensions` in float32, and that tension again in float64, (n,) each.
     lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
-    when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such instant
+    when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such sample
     if kind.from_rest:
         return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
-    instant = instant_lanes(amplitude, segments.sense, arcs, tau[when])
-    return lowest, lowest_tension(robot, segments, arcs, instant, kind)
+    phase = phase_lanes(amplitude, segments.sense, arcs, tau[when])
+    return lowest, lowest_tension(robot, segments, arcs, phase, kind)
 
 
-class TensionSieve(NamedTuple):
-    """Sieve of motions of one robot, by their tensions at a few instants.
+class TensionScreen(NamedTuple):
+    """Screen of motions of one robot, by their tensions at a few samples.
 
     Fields:
         robot: the robot.
         amplitude: A.
         kind: of the motions.
-        least: tension that refutes, as any smaller one does.
-        size: how many motions are looked at in one call.
-        count_instants: called with the number of instants that were looked at.
+        threshold: tension that refutes, as any smaller one does.
+        batch: how many motions are computed in one call.
+        count_samples: called with the number of samples that were computed.
     """
 
     robot: PlatformRobot
     amplitude: Amplitude
     kind: PlatformMotionKind
-    least: float
-    size: int
-    count_instants: Callable[[int], None]
+    threshold: float
+    batch: int
+    count_samples: Callable[[int], None]
 
     def lowest(self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"]) -> Float[np.ndarray, "n"]:
-        """Smallest tension over some instants."""
+        """Smallest tension over some samples."""
         lowest = np.full(len(segments.rate), np.inf)
         for chunk in _chunks(tau):
             lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
@@ -156,31 +154,31 @@ class TensionSieve(NamedTuple):
     def refuted(
         self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"], *, limits: bool = True
     ) -> Bool[np.ndarray, "n"]:
-        """Motions that some instants refute."""
+        """Motions that some samples refute."""
         del limits
         is_refuted = np.zeros(len(segments.rate), bool)
         for chunk in _chunks(tau):
             alive = np.flatnonzero(~is_refuted)
             if not len(alive):
                 break
-            remaining = segments if len(alive) == len(is_refuted) else rows(segments, alive)
-            if len(alive) <= device_batch_size(self.size // FEWER):  # not worth two looks
-                is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.least)
+            remaining = segments if len(alive) == len(is_refuted) else take_segments(segments, alive)
+            if len(alive) <= device_batch_size(self.batch // FEWER):  # not worth two passes
+                is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.threshold)
                 continue
-            self.count_instants(len(alive) * (len(chunk) + 1))
+            self.count_samples(len(alive) * (len(chunk) + 1))
             kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
-            lowest, certain = in_batches(kernel, remaining, batch_size=self.size)
-            is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
+            lowest, certain = in_batches(kernel, remaining, batch_size=self.batch)
+            is_refuted[alive] = (lowest < 0.0) & ~(certain > self.threshold)
         return is_refuted
 
     def _lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        # Look at few motions, in float64.
-        self.count_instants(len(segments.rate) * len(tau))
+        # Few motions, in float64.
+        self.count_samples(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
-        return in_batches(kernel, segments, batch_size=self.size // FEWER)[0]
+        return in_batches(kernel, segments, batch_size=self.batch // FEWER)[0]
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:
-    # Repeat the last instant, so that all chunks have one shape.
+    # Repeat the last sample, so that all chunks have one shape.
     length = -(-len(tau) // CHUNK) * CHUNK
     return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)

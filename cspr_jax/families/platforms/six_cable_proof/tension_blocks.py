@@ -23,18 +23,23 @@ from jax import Array, lax
 
 from cspr_jax.families.platforms.platform_segment import PlatformSegment
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, squared_duration, state
-from cspr_jax.families.platforms.six_cable_proof.complex_bounds import Reach, instant_beside, middle_of, reach
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import (
+    EllipseBounds,
+    ellipse_bounds,
+    middle_of,
+    phase_beside,
+)
 from cspr_jax.families.platforms.six_cable_proof.limit_blocks import (
     QUANTITIES,
     STRAIGHT,
+    CableBounds,
     Enclosed,
-    Here,
+    Node,
     Pair,
-    Sizes,
     at_most,
     ratio,
 )
-from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
+from cspr_jax.families.platforms.six_cable_proof.work_list import smallest_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
@@ -53,7 +58,7 @@ if TYPE_CHECKING:
 # constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
 NODE_ERROR = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
-REGULAR = CABLES  # the place of D among the values
+REGULAR = CABLES  # index of D among the values
 BASIC = 2  # criteria that are no limits
 
 
@@ -63,16 +68,16 @@ class TensionBounds(NamedTuple):
     Fields:
         nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up: no lower than they truly are; infinite
             where D is not certainly positive. With margins the slack of the determinant is that of
-            `wrench_lanes.normalised_determinant` over its value at rest in P0. Where only the least values are
-            computed: (1, n_criteria, n).
-        place: (n,) place of the smallest of the least values, from -1 to 1; 0 where the values at all nodes are kept.
+            `wrench_lanes.normalised_determinant` over its value at rest in P0. Reduced to their
+            minima: (1, n_criteria, n).
+        offset: (n,) where in the block the smallest of the minima is, from -1 to 1; 0 where all nodes are kept.
         bound: (n_criteria, n) proved lower bounds.
         rounding: (n,) largest allowance for rounding in the slacks of taut cables, before they are divided by D.
         allowed: (n,) largest allowance in all, which includes what the polynomials leave out.
     """
 
     nodes: Array
-    place: Array
+    offset: Array
     bound: Array
     rounding: Array
     allowed: Array
@@ -87,25 +92,25 @@ class _Block(NamedTuple):
 
 
 def of_motion(problem: Problem) -> list[Limit]:
-    """Rows of the limits on the motion that are set."""
+    """The limits on the motion that are set."""
     return [row for row in limits_set(problem.limits) if row.of_motion]
 
 
-@persistent_jit(static_argnames=("kind", "margins", "least"))
+@persistent_jit(static_argnames=("kind", "margins", "reduced"))
 def tension_blocks(
-    problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
+    problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind, margins: bool, reduced: bool = False
 ) -> TensionBounds:
     """Bounds of slacks on blocks."""
-    taken = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
+    interpolated = _interpolated(problem, one, items, kind=kind, margins=margins, single_precision=reduced)
     # Values that only margins need come last, and are not bounded.
-    nodes, bound = _bounds(problem, taken)
+    nodes, bound = _bounds(problem, interpolated)
     if margins:
-        nodes[1] = nodes[1] * taken.values[:, len(taken.rests)]
-    if least:
-        node_values, place = least_nodes(nodes, len(nodes), chebyshev.nodes())
+        nodes[1] = nodes[1] * interpolated.values[:, len(interpolated.remainders)]
+    if reduced:
+        node_values, offset = smallest_nodes(nodes, len(nodes), chebyshev.nodes())
     else:
-        node_values, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
-    return TensionBounds(node_values, place, jnp.stack(bound), *_allowances(taken))
+        node_values, offset = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
+    return TensionBounds(node_values, offset, jnp.stack(bound), *_allowances(interpolated))
 
 
 class TensionRange(NamedTuple):
@@ -127,11 +132,11 @@ class TensionRange(NamedTuple):
 @partial(jax.jit, static_argnames="kind")
 def tension_ranges(problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind) -> TensionRange:
     """Ranges of the tensions of each cable on blocks."""
-    taken = _taken(problem, one, items, kind=kind, margins=False)
-    low, high = (_coefficients(taken.values) + sign * taken.rests[None] for sign in (-1.0, 1.0))
+    interpolated = _interpolated(problem, one, items, kind=kind, margins=False)
+    low, high = (_coefficients(interpolated.values) + sign * interpolated.remainders[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
     minimum, maximum = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
-    return TensionRange(jnp.min(minimum, axis=0), -jnp.min(maximum, axis=0), *_allowances(taken))
+    return TensionRange(jnp.min(minimum, axis=0), -jnp.min(maximum, axis=0), *_allowances(interpolated))
 
 
 def _coefficients(values: Array) -> Array:
@@ -140,75 +145,75 @@ def _coefficients(values: Array) -> Array:
     return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
 
 
-def _allowances(taken: "_Taken") -> tuple[Array, Array]:
-    return jnp.max(taken.rounding[:CABLES], axis=0), jnp.max(taken.rests[:CABLES], axis=0)
+def _allowances(interpolated: "_Interpolated") -> tuple[Array, Array]:
+    return jnp.max(interpolated.rounding[:CABLES], axis=0), jnp.max(interpolated.remainders[:CABLES], axis=0)
 
 
-class _Taken(NamedTuple):
+class _Interpolated(NamedTuple):
     # Values of blocks at the nodes (m, n_values, n), what the polynomials through the first n_rests of these values
     # leave out (n_rests, n), and the part of this that is rounding.
     block: _Block
     values: Array
-    rests: Array
+    remainders: Array
     rounding: Array
 
 
-def _taken(
+def _interpolated(
     problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, single_precision: bool = False
-) -> _Taken:
+) -> _Interpolated:
     segments, arcs, regular, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
 
     def at(off):
-        instant = instant_beside(middle, segments.sense, arcs, off * half)
-        return state(segments, arcs, materialized(instant, one), kind, one)
+        phase = phase_beside(middle, segments.sense, arcs, off * half)
+        return state(segments, arcs, materialized(phase, one), kind, one)
 
     def values_at(node):
         return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
 
-    together, apart = (
+    pack, unpack = (
         (packed_arrays.packed, packed_arrays.unpacked)
         if single_precision
         else (packed_arrays.paired, packed_arrays.parts)
     )
-    values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
+    values = jnp.stack(unpack(lax.map(lambda node: pack(values_at(node)), chebyshev.nodes())), axis=1)
     lengths = materialized(_lengths(problem.robot, at(0.0)), one)
     radii = np.array(chebyshev.RADII)
     axes = np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]])
 
-    def reach_on(ellipse):
+    def bounds_on(ellipse):
         along, aside = ellipse
-        return packed_arrays.paired(reach(segments, arcs, middle, (along * half, aside * half), kind))
+        return packed_arrays.paired(ellipse_bounds(segments, arcs, middle, (along * half, aside * half), kind))
 
-    def sizes_on(ellipse):
+    def magnitudes_on(ellipse):
         along, pairs, factor = ellipse
-        bounds = _sizes(problem, block, Reach(*packed_arrays.parts(pairs)), along * half, lengths)
+        bounds = _magnitude_bounds(problem, block, EllipseBounds(*packed_arrays.parts(pairs)), along * half, lengths)
         return packed_arrays.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in bounds])
 
     factors = np.append(chebyshev.remainders(radii), NODE_ERROR)
-    sizes = jnp.stack(packed_arrays.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
+    magnitudes = jnp.stack(packed_arrays.parts(lax.map(magnitudes_on, (axes[:, 0], lax.map(bounds_on, axes), factors))))
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
-    largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
+    largest = jnp.max(jnp.abs(values[:, : len(magnitudes)]), axis=0)
     largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # three cables in one plane
-    rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
-    rests = jnp.min(sizes[:, :-1], axis=1) + rounding
+    rounding = magnitudes[:, -1] * amplified[None] + COEFFICIENTS * largest
+    remainders = jnp.min(magnitudes[:, :-1], axis=1) + rounding
     if single_precision:
-        rests = rests + chebyshev.LEBESGUE * packed_arrays.SINGLE_ERROR * largest
-    return _Taken(block, values, rests, rounding)
+        remainders = remainders + chebyshev.LEBESGUE * packed_arrays.SINGLE_ERROR * largest
+    return _Interpolated(block, values, remainders, rounding)
 
 
-def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool) -> list[Pair]:
+def _values(problem: Problem, block: _Block, current: StateLanes, *, margins: bool) -> list[Pair]:
     # Return the values at one node in pairs, each of which XLA computes in one loop: kappa and D, the factor of
     # rounding, the values that the limits need, and the factor that turns D into the normalised determinant.
     robot = problem.robot
-    cables = cable_lanes(robot, here.position, here.rotation)
+    cables = cable_lanes(robot, current.position, current.rotation)
 
     def slowed(vector):
         return tuple(x / block.squared for x in vector)
 
     force, moment = inertial_wrench(
-        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+        robot, slowed(current.acceleration), current.rotation, current.omega, current.angular_acceleration
     )
     balanced = balance(cables, force, slowed(moment))
     inverse = 1.0 / balanced.volume
@@ -218,9 +223,9 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
     kappa = [x * (fraction * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
     regular = balanced.denominator * fraction
     pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
-    instant = Here(here, cables, kappa, block.squared, block.z0)
+    node = Node(current, cables, kappa, block.squared, block.z0)
     for quantity, row in _quantities(problem).items():
-        pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
+        pairs += QUANTITIES[quantity].values(node, getattr(problem.limits, row[0].name))
     if margins:
         standing = cable_lanes(robot, tuple(block.segments.center[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
@@ -237,27 +242,27 @@ def _level(template: Array):
 
 def _quantities(problem: Problem) -> dict[str, list[Limit]]:
     # Return the quantities that limits bound, each with its limits.
-    rows: dict[str, list[Limit]] = {}
-    for row in of_motion(problem):
-        rows.setdefault(row.quantity, []).append(row)
-    return rows
+    limits: dict[str, list[Limit]] = {}
+    for limit in of_motion(problem):
+        limits.setdefault(limit.quantity, []).append(limit)
+    return limits
 
 
-def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
+def _lengths(robot: PlatformRobot, current: StateLanes) -> tuple[list[Array], list[Array]]:
     # Return the lengths of the cables, and the distances from the spools to the mass centre.
-    cables = cable_lanes(robot, here.position, here.rotation)
-    offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
-    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offs))
+    cables = cable_lanes(robot, current.position, current.rotation)
+    offsets = [tuple(current.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offsets))
     return rays, away
 
 
-def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
-    # Bound the sizes, on an ellipse, of the values of `_values`, in the same order, by Hadamard's inequality: moments
-    # are in platform axes, over the mean arm times the growth.
+def _magnitude_bounds(problem: Problem, block: _Block, bounds: EllipseBounds, along: Array, lengths) -> list[Array]:
+    # Bound the magnitudes, on an ellipse, of the values of `_values`, in the same order, by Hadamard's inequality:
+    # moments are in platform axes, over the mean arm times the norm of the rotation.
     robot, squared, z0 = problem.robot, block.squared, block.z0
-    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
-    arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
-    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.radial_rate + 1.0)
+    arm_lengths = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    arm, arms = jnp.sqrt(jnp.mean(arm_lengths**2)), [arm_lengths[k] for k in range(CABLES)]
+    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.rotation_norm + 1.0)
     moved = [shift + lever * rotated for lever in arms]
     rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
     columns = [
@@ -265,55 +270,59 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
         for ray, lever, away in zip(rays, arms, lengths[1], strict=True)
     ]
     inertia = robot.inertia / robot.mass
-    apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
+    deviator = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
     acceleration_matrix = (
-        jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+        jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(deviator**2)) * bounds.omega**2
     )
     force = bounds.second_derivative / squared + robot.gravity
-    wrench = jnp.sqrt(force**2 + (acceleration_matrix / squared / (arm * bounds.radial_rate)) ** 2)
-    full = (arm * bounds.radial_rate) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    wrench = jnp.sqrt(force**2 + (acceleration_matrix / squared / (arm * bounds.rotation_norm)) ** 2)
+    full = (arm * bounds.rotation_norm) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
     kappa = [CABLES * z0 / robot.gravity * full * wrench / column for column in columns]
-    paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
-    pulls = [
-        bounds.second_derivative + lever * bounds.radial_rate * (bounds.angular_acceleration + bounds.omega**2)
+    ray_rates = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
+    ray_accelerations = [
+        bounds.second_derivative + lever * bounds.rotation_norm * (bounds.angular_acceleration + bounds.omega**2)
         for lever in arms
     ]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
-    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.second_derivative)
+    cable_bounds = CableBounds(
+        kappa, rays, ray_rates, ray_accelerations, is_straight, squared, z0, bounds.speed, bounds.second_derivative
+    )
     largest = [*kappa, full, jnp.zeros_like(full)]
-    for quantity, row in _quantities(problem).items():
-        largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))
+    for quantity, limits in _quantities(problem).items():
+        largest += QUANTITIES[quantity].bounds(cable_bounds, getattr(problem.limits, limits[0].name))
     return largest
 
 
-def _bounds(problem: Problem, taken: _Taken) -> tuple[list[Array], list[Array]]:
+def _bounds(problem: Problem, interpolated: _Interpolated) -> tuple[list[Array], list[Array]]:
     # Return the smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds,
     # (n,) each.
-    rests, block = taken.rests, taken.block
-    values = taken.values[:, : len(rests)]
+    remainders, block = interpolated.remainders, interpolated.block
+    values = interpolated.values[:, : len(remainders)]
     coefficients = _coefficients(values)
 
     def around(middle, off, part):
         return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
 
     one = slice(REGULAR, REGULAR + 1)
-    regular, fraction = around(coefficients, rests, one), around(values, taken.rounding, one)
+    regular, fraction = around(coefficients, remainders, one), around(values, interpolated.rounding, one)
     # Among quotients with one denominator, the smallest has the smallest numerator.
-    minimum = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
-    doubt = jnp.max(taken.rounding[None, :CABLES], axis=1, keepdims=True)
+    minimum = jnp.min(coefficients[:, :CABLES] - remainders[None, :CABLES], axis=1, keepdims=True)
+    doubt = jnp.max(interpolated.rounding[None, :CABLES], axis=1, keepdims=True)
     kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
     nodes = [at_most(kappa, fraction)[:, 0], fraction[1][:, 0]]
     bound = [jnp.min(ratio(minimum, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
     part, slacks = slice(0, REGULAR + 2), {}
-    for quantity, rows in _quantities(problem).items():
-        factor, size = scale.get(quantity, (1.0, jnp.ones(())))
+    for quantity, limits in _quantities(problem).items():
+        factor, unit = scale.get(quantity, (1.0, jnp.ones(())))
         part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
-        enclosed = Enclosed(around(coefficients, rests, part), around(values, taken.rounding, part), regular, fraction)
-        for row in rows:
-            limit = getattr(problem.limits, row.name) * (factor / size)
-            slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
-    for row in of_motion(problem):
-        nodes.append(slacks[row.name][0])
-        bound.append(slacks[row.name][1])
+        enclosed = Enclosed(
+            around(coefficients, remainders, part), around(values, interpolated.rounding, part), regular, fraction
+        )
+        for limit in limits:
+            allowed = getattr(problem.limits, limit.name) * (factor / unit)
+            slacks[limit.name] = QUANTITIES[quantity].slacks(enclosed, allowed, limit.sense == "least")
+    for limit in of_motion(problem):
+        nodes.append(slacks[limit.name][0])
+        bound.append(slacks[limit.name][1])
     return nodes, bound

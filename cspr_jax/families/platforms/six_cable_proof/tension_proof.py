@@ -1,10 +1,11 @@
-"""Proofs about the tensions and the determinant of a platform's motions, between the instants too.
+"""Proofs about the tensions and the determinant of a platform's motions, between the samples too.
 
-Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, or halved. The motion is then
+Every block of a motion (`tension_blocks`) is proved, or refuted by a sample, or halved. The motion is then
 
     proved       if every block is proved: no cable slack, no singularity, limits on the motion met
-    refuted      if some instant breaks a criterion by more than the tolerance
-    undecided    if a block still holds zero where its slack is known to half the tolerance, or after many halvings
+    refuted      if some sample breaks a criterion by more than the tolerance
+    undecided    if a block still holds zero where its slack is enclosed within half the tolerance, or after many
+    halvings
 
 A limit that is touched counts as met: the slacks of limits are those of `problem.touchable`, and undecided within
 rounding alone.
@@ -20,8 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cspr_jax.families.platforms.motions import rows
-from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
 from cspr_jax.families.platforms.six_cable_proof.tension_blocks import (
     BASIC,
     TensionBounds,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Num
 
 # Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
-# are narrowed down from the instants of blocks, the number is fixed; for verdicts alone it grows from the first to the
+# are narrowed down from the samples of blocks, the number is fixed; for verdicts alone it grows from the first to the
 # second number with the amplitude, see `blocks.growing`.
 WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
@@ -58,12 +58,12 @@ class TensionProof:
     """Proofs about n motions; criteria are those of `tension_blocks.TensionBounds`.
 
     Fields:
-        is_proved: (n,) whether every criterion is met at every instant.
-        is_refuted: (n,) whether some criterion is broken at an instant.
-        attained: (n, n_criteria) smallest slacks at the instants that were looked at.
+        is_proved: (n,) whether every criterion is met at every time.
+        is_refuted: (n,) whether some criterion is broken at a sample.
+        attained: (n, n_criteria) smallest slacks at the samples.
         bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
-        instant: (n,) tau at which a criterion is broken by most; NaN where none is.
-        row: (k,) motion of each of the first blocks.
+        refuted_tau: (n,) tau at which a criterion is broken by most; NaN where none is.
+        motion: (k,) motion of each of the first blocks.
         first: bounds of the first blocks.
     """
 
@@ -71,8 +71,8 @@ class TensionProof:
     is_refuted: np.ndarray
     attained: np.ndarray
     bound: np.ndarray
-    instant: np.ndarray
-    row: np.ndarray
+    refuted_tau: np.ndarray
+    motion: np.ndarray
     first: BlockBounds
 
 
@@ -89,15 +89,15 @@ class Certifier:
     Args:
         problem: robot, limits, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: called with the number of instants that were looked at.
+        count_samples: called with the number of samples that were computed.
     """
 
     def __init__(
-        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
         """Order the cables."""
         problem = touchable(problem)
-        self._kind, self._batch, self._count = kind, batch, count_instants
+        self._kind, self._batch, self._count = kind, batch, count_samples
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
         self._is_limit = np.arange(BASIC + len(of_motion(problem))) >= BASIC
         ramp = FROM_REST if kind.from_rest else BETWEEN
@@ -116,66 +116,68 @@ class Certifier:
         blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
-        def look(part: Blocks, _: int) -> BlockBounds:
-            bounds = self._looked_at(part, motions, margins=margins)
-            tau = part.times(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.place)[None])
+        def bounds_of(part: Blocks, _: int) -> BlockBounds:
+            bounds = self._bounds_in_orders(part, motions, margins=margins)
+            tau = part.times(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.offset)[None])
             nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.bound)
-            return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[part.row, 0], 0.0))
+            return BlockBounds(
+                nodes, bound, tau, lambda attained: bound[0] >= near * np.maximum(attained[part.row, 0], 0.0)
+            )
 
         work = WorkList(
             arcs,
             np.where(self._is_limit, LIMITS_UNDECIDED if margins else SIX_CABLES_UNDECIDED, SIX_CABLES_UNDECIDED),
             ignored,
         )
-        first = work.work_off(blocks, look)
+        first = work.run(blocks, bounds_of)
         is_proved = ~work.is_refuted & ~work.is_stuck
-        proof = TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
+        proof = TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.refuted_tau, blocks.row, first)
         if not margins:
-            self._look_closer(proof, segments, arcs, np.flatnonzero(work.is_stuck & ~work.is_refuted), ignored)
+            self._prove_again(proof, segments, arcs, np.flatnonzero(work.is_stuck & ~work.is_refuted), ignored)
         return proof
 
-    def _look_closer(
+    def _prove_again(
         self, proof: TensionProof, segments: PlatformSegment, arcs: np.ndarray, stuck: np.ndarray, ignored
     ) -> None:
-        # Values in single precision do not decide limits that are nearly touched.
+        # Values in single precision do not decide limits that are nearly touched: prove these with all nodes.
         is_near = (proof.attained[stuck][:, self._is_limit] < SIX_CABLES_UNDECIDED).any(1)
         is_near &= (proof.attained[stuck][:, ~self._is_limit] > SIX_CABLES_UNDECIDED).all(1)
         if is_near.any():
             again = stuck[is_near]
-            closer = self.prove(rows(segments, again), arcs[again], margins=True, ignored=ignored)
-            for name in ("is_proved", "is_refuted", "attained", "bound", "instant"):
+            closer = self.prove(take_segments(segments, again), arcs[again], margins=True, ignored=ignored)
+            for name in ("is_proved", "is_refuted", "attained", "bound", "refuted_tau"):
                 getattr(proof, name)[again] = getattr(closer, name)
 
-    def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
-        bounds = self.bounds(0, blocks, motions, margins=margins, least=not margins)
+    def _bounds_in_orders(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
+        bounds = self.bounds(0, blocks, motions, margins=margins, reduced=not margins)
         for k in range(1, len(self._orders)):
             # These blocks stay open because the first three cables lie nearly in one plane.
             open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > SIX_CABLES_UNDECIDED).all(0))
             if not len(open_ones):
                 break
-            better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, least=not margins)
+            better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, reduced=not margins)
             # Replace the values at nodes too: where these cables lie in one plane the values are rounding, and could
             # refute.
             surer = better.rounding < bounds.rounding[open_ones]
             bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
-            bounds.place[open_ones[surer]] = better.place[surer]
+            bounds.offset[open_ones[surer]] = better.offset[surer]
             bounds.bound[:, open_ones] = np.fmax(bounds.bound[:, open_ones], better.bound)
             bounds.rounding[open_ones] = np.minimum(bounds.rounding[open_ones], better.rounding)
             bounds.allowed[open_ones] = np.minimum(bounds.allowed[open_ones], better.allowed)
         return bounds
 
-    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> TensionBounds:
+    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, reduced: bool = False) -> TensionBounds:
         """Bounds on blocks."""
         problem, items = self._items(order, blocks, motions)
-        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
+        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, reduced=reduced)
         return in_batches(kernel, items, batch_size=self._batch, axis=-1)
 
     def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
         # Return the robot with its cables in an order, and its blocks as kernels take them.
-        segments, arcs, standing = motions
+        segments, arcs, at_rest = motions
         problem, sign, _ = self._orders[order]
         self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
-        motion_items = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
+        motion_items = take_segments(segments, blocks.row), arcs[blocks.row].astype(float), sign * at_rest[blocks.row]
         return problem, (*motion_items, blocks.start, blocks.stop)
 
     def ranges(
@@ -231,10 +233,12 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
     robot, limits = problem.robot, problem.limits
     points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
     changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
-    each = {row.name: getattr(limits, row.name) for row in LIMITS}
+    each = {limit.name: getattr(limits, limit.name) for limit in LIMITS}
     values: dict[str, Any] = {
-        row.name: np.asarray(each[row.name])[order] if row.per_cable and each[row.name] is not None else each[row.name]
-        for row in LIMITS
+        limit.name: np.asarray(each[limit.name])[order]
+        if limit.per_cable and each[limit.name] is not None
+        else each[limit.name]
+        for limit in LIMITS
     }
     return problem._replace(robot=changed, limits=Limits(**values))
 

@@ -1,8 +1,8 @@
-"""Equations and bounds of a motion at an instant, for a search.
+"""Equations and bounds of a motion at one time, for a search.
 
 Values are the tensions over the weight, and whatever else limits bound, over the limit. Tensions are unknowns of their
 own: equations say that they balance the motion, and that all other values are those of its state. So redundant cables
-need no rule, and no matrix is inverted, which may be singular on the way.
+need no rule, and no matrix is inverted, which may be singular on the path.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.curves.spline import turning_of
-from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.limits import other_limits
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.model.limits import Limits
@@ -24,7 +24,6 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import in_one_plane, plane_normal, spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
-from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import BELOW, Criterion, judged_poses
 
@@ -34,18 +33,18 @@ if TYPE_CHECKING:
 BATCH = 128
 # Entries of x behind the coordinates.
 SCALARS = 2
-# Depth below the plane of the spools, over the size of the robot, that a search keeps at least.
+# Smallest depth below the plane of the spools, over the robot's radius, that a search allows.
 DEPTH = 0.02
 
 
 def coordinates(pattern: str) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates of an effector."""
-    row = PATTERNS[pattern]
-    return np.array(row.forces, int), np.array(row.moments, int)
+    pattern_row = PATTERNS[pattern]
+    return np.array(pattern_row.forces, int), np.array(pattern_row.moments, int)
 
 
 def state_of(robot: AnyRobot, reference: Float[Array, "4"], *motion: Float[Array, "d"]) -> State:
-    """State of a motion at one instant."""
+    """State of a motion at one time."""
     along, about = coordinates(robot.pattern)
     position, velocity, acceleration = (jnp.zeros(3).at[along].set(part[: len(along)]) for part in motion)
     if not len(about):
@@ -63,16 +62,11 @@ def keeps_depth(robot: AnyRobot) -> bool:
     return judged_poses(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
 
 
-def other_rows(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are set, but those of tensions."""
-    return [row for row in limits_set(limits) if row.quantity != "tension"]
-
-
 def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
     # Values beside tensions, duration and determinant: over limits, of the mass centre squared; depths over the
-    # robot's size.
+    # robot's radius.
     length, rate, second_derivative = cable_motion(robot, state)
-    size = spool_radius(robot)
+    radius = spool_radius(robot)
     values = {
         "depth": state.position[2:],
         "length": length,
@@ -82,12 +76,12 @@ def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
         "mass_centre_acceleration": jnp.sum(state.acceleration**2, keepdims=True),
     }
     parts = []
-    for row in other_rows(limits):
-        limit = jnp.atleast_1d(jnp.asarray(getattr(limits, row.name)))
-        scale = size if row.is_height else limit**2 if row.of_mass_centre else limit
-        parts.append(values[row.quantity] / scale)
+    for limit in other_limits(limits):
+        allowed = jnp.atleast_1d(jnp.asarray(getattr(limits, limit.name)))
+        scale = radius if limit.is_height else allowed**2 if limit.of_mass_centre else allowed
+        parts.append(values[limit.quantity] / scale)
     if keeps_depth(robot):
-        parts.append(jnp.dot(plane_normal(robot), state.position)[None] / size)
+        parts.append(jnp.dot(plane_normal(robot), state.position)[None] / radius)
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
 
 
@@ -98,14 +92,14 @@ def residual_at(
     motion: Sequence[Array],
     tensions: Float[Array, "n_cables"],
 ) -> Float[Array, "n_equations"]:
-    """Residual of the equations, but those of duration and determinant, at an instant."""
+    """Residual of the equations, but those of duration and determinant, at one time."""
     state, unit = state_of(robot, reference, *motion), wrench_units(robot)
     wrench = robot.wrench_matrix(state) @ tensions - robot.inertial_wrench(state) / (robot.mass * robot.gravity)
     return jnp.concatenate([wrench / unit, -_other_values(robot, limits, state)])
 
 
 class ValueBounds(NamedTuple):
-    """Bounds of the values at an instant, and how criteria tighten them.
+    """Bounds of the values at one time, and how criteria tighten them.
 
     Fields:
         low: (n_values,) -inf for none.
@@ -113,7 +107,7 @@ class ValueBounds(NamedTuple):
         rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
         falls: (n_criteria, n_values) by how much an upper bound falls.
         determinant: number of the value that is the determinant; None without one.
-        depth: number of the value that is the depth below the plane of the spools, over the size of the robot; None
+        depth: number of the value that is the depth below the plane of the spools, over the robot's radius; None
             without such a plane.
     """
 
@@ -129,32 +123,32 @@ class _Value(NamedTuple):
     # A value: bounds, the criteria that they stand for, its cable or -1, and its change with that of the slack.
     low: float
     high: float
-    least: Verdict
-    most: Verdict
+    low_flag: Verdict
+    high_flag: Verdict
     cable: int
     change: float
 
 
-def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed: bool = False) -> ValueBounds:
+def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_timed: bool = False) -> ValueBounds:
     """Bounds of the values."""
-    weight, size = float(robot.mass * robot.gravity), float(spool_radius(robot))
-    together, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
+    weight, radius = float(robot.mass * robot.gravity), float(spool_radius(robot))
+    infeasible, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
     low, high = (np.asarray(side) / weight for side in tension_range(robot, limits))
-    slack, over = Verdict.SLACK_CABLE | together, Verdict.OVER_TENSION | together
+    slack, over = Verdict.SLACK_CABLE | infeasible, Verdict.OVER_TENSION | infeasible
     values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight) for k in numbers]
-    for row in other_rows(limits):
-        limit = np.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
-        for k, maximum in enumerate(limit):
+    for limit in other_limits(limits):
+        allowed = np.broadcast_to(getattr(limits, limit.name), robot.n_cables if limit.per_cable else 1)
+        for k, maximum in enumerate(allowed):
             # Squares change twice as much.
-            change = 1.0 / size if row.is_height else (2.0 if row.of_mass_centre else 1.0) / maximum
-            top = maximum / size if row.is_height else 1.0
-            bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
-            values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
+            change = 1.0 / radius if limit.is_height else (2.0 if limit.of_mass_centre else 1.0) / maximum
+            top = maximum / radius if limit.is_height else 1.0
+            bottom = -1.0 if limit.quantity in ("speed", "acceleration") else -np.inf
+            values.append(_Value(bottom, top, limit.flag, limit.flag, k if limit.per_cable else -1, change))
     is_regular, _ = judged_poses(robot)
     is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
         minimum = DEPTH if is_divided else -np.inf
-        values.append(_Value(minimum, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
+        values.append(_Value(minimum, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / radius))
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
     if is_regular:
@@ -166,18 +160,18 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
             [
                 [
                     value.change
-                    if getattr(value, side) & row.flag
-                    and value.cable in (*(row.cables or numbers), -1)
+                    if getattr(value, side) & limit.flag
+                    and value.cable in (*(limit.cables or numbers), -1)
                     and np.isfinite(getattr(value, bound))
                     else 0.0
                     for value in values
                 ]
-                for row in rows
+                for limit in criteria
             ]
         )
 
     low, high = (np.array([getattr(value, side) for value in values]) for side in ("low", "high"))
-    places = {value.least: k for k, value in enumerate(values)}
-    depth = places.get(Verdict.ABOVE_SPOOLS) if is_divided else None
-    sides = changes("least", "low"), changes("most", "high")
-    return ValueBounds(low, high, *sides, determinant=places.get(Verdict.SINGULAR), depth=depth)
+    index_of = {value.low_flag: k for k, value in enumerate(values)}
+    depth = index_of.get(Verdict.ABOVE_SPOOLS) if is_divided else None
+    sides = changes("low_flag", "low"), changes("high_flag", "high")
+    return ValueBounds(low, high, *sides, determinant=index_of.get(Verdict.SINGULAR), depth=depth)
