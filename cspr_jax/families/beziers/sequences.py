@@ -106,11 +106,11 @@ def _parts(arguments, x: Array) -> tuple[Array, Array]:
 
 def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> Float[np.ndarray, "n"]:
     """Durations whose sum is least."""
-    given = np.array([1.0 if time is None else time for time in durations])
+    initial = np.array([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None])
 
     def times(x: np.ndarray) -> np.ndarray:
-        all_durations = given.copy()
+        all_durations = initial.copy()
         all_durations[free] = np.exp(x)
         return all_durations
 
@@ -118,7 +118,7 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
     shortest, longest = (np.full(len(free), bound) for bound in bounds)
     logarithms = constrained_minimum(
         _parts,
-        (problem, sequence, jnp.asarray(given), free),
+        (problem, sequence, jnp.asarray(initial), free),
         shortest,
         longest,
         lambda x: verified(problem, segments_of(sequence, jnp.asarray(times(x)))),

@@ -70,13 +70,15 @@ def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterat
     )
     search = Neighbours(coarse, [question.poses.z0 for question in questions])
     search.search()
-    found = np.flatnonzero(np.isfinite(search.duration))
-    if not len(found):
+    solved = np.flatnonzero(np.isfinite(search.duration))
+    if not len(solved):
         return
-    begun = _refined(coarse.basis, fine.take(found), search.controls[found], search.duration[found], FINE[0][0])
-    unknowns, is_optimal = _first_optima(fine.take(found), begun, FINE[:TRIED])
-    found = found[is_optimal]
-    yield from zip(found.tolist(), *_proved(questions, found, fine.take(found), unknowns.take(is_optimal)), strict=True)
+    begun = _refined(coarse.basis, fine.take(solved), search.controls[solved], search.duration[solved], FINE[0][0])
+    unknowns, is_optimal = _first_optima(fine.take(solved), begun, FINE[:TRIED])
+    solved = solved[is_optimal]
+    yield from zip(
+        solved.tolist(), *_proved(questions, solved, fine.take(solved), unknowns.take(is_optimal)), strict=True
+    )
 
 
 def _stacked(tasks: Sequence[Tasks]) -> Tasks:

@@ -24,8 +24,8 @@ from cspr_jax.verification.proved_answers import ProvedAnswers, judge_all_robots
 
 # Weights of barriers, and softness, with which searches go on from a coarser motion.
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Searches of all segments together: by what the intervals are divided, and the number of a way of `FINE`. Searches that
-# get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
+# Searches of all segments together: by what the intervals are divided, and the index of an option of `FINE`. Searches
+# that get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
 # this part of its duration: by what the intervals are divided, and the softness; samples of each interval. The last
@@ -68,7 +68,7 @@ class FreeMotion:
     """The best motion that the search has come to.
 
     Fields:
-        motions: one a segment; of a search that came to none, the last one it looked at.
+        motions: one a segment; of a search that came to none, the last one it tried.
         answers: of them: proved, refuted or undecided.
         energy: (n,) integral of the sum of the squares of the tensions, N^2 s, of the segments.
         level: (n,) of the objective, as `objectives` has it.

@@ -261,13 +261,15 @@ class FreeMotions(Leg):
         if isinstance(problem.robot, PlatformRobot):
             quaternions = pose_quaternions(waypoints, positions)
         accelerations = np.full((len(positions), 3 if quaternions is None else 6), np.nan)
-        given = waypoints.plan_file.end_accelerations
-        if given == "swing":
+        requested = waypoints.plan_file.end_accelerations
+        if requested == "swing":
             accelerations[:] = 0.0
             accelerations[:, :3] = -float(problem.robot.gravity) / z0 * (positions - rest_point(z0))
-        elif isinstance(given, list):
+        elif isinstance(requested, list):
             accelerations[:] = 0.0
-            accelerations[:, :3] = waypoints.frame.rotated(np.array(given[waypoints.first : waypoints.last + 1], float))
+            accelerations[:, :3] = waypoints.frame.rotated(
+                np.array(requested[waypoints.first : waypoints.last + 1], float)
+            )
         accelerations[[pose.rest for pose in waypoints.poses]] = 0.0
         rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in waypoints.poses])
         middle = z0 if np.isfinite(z0) else float(positions[:, 2].mean())

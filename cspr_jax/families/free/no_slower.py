@@ -1,7 +1,7 @@
 """Motions of other families in place of what a search finds, where they are faster, or it finds nothing.
 
 Splines follow them, at poses exactly. Orientations are splines of quaternions of their own, and no Rodrigues vectors:
-motions of platforms may swing further than half a turn from the orientation half-way, where these end.
+motions of platforms may swing further than half a turn from the orientation in the middle, where these end.
 """
 
 from __future__ import annotations

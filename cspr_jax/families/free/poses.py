@@ -86,7 +86,7 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
         return _Joined(ends, velocities, references, turns, linear)
     start, end = poses.quaternions[:-1], poses.quaternions[1:]
     end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
-    # From half-way between, a Rodrigues vector is no longer than 1.
+    # From the middle between both, a Rodrigues vector is no longer than 1.
     references = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
     for side, quaternions in enumerate((start, end)):
         turning = products(quaternions, references * BACK)

@@ -19,7 +19,7 @@ from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
 # Slack that is left after tightening, in the units of values; smallest and largest part by which bounds tighten, the
 # latter times half their range where that is above 1; by what part of it those of the next pieces do.
 LEFT, STEP, MAX_PART, BESIDE = 1e-7, 1e-6, 0.03, 0.5
-# By what more than is missed they tighten; from what time on by its powers, since some motions give way to each step.
+# By what more than is missed they tighten; from what time on by its powers, since some motions change with each step.
 MORE, PATIENCE = 1.5, 4
 # Samples of each interval, of point masses and of platforms: between two of them, the tensions of platforms change
 # more.

@@ -19,7 +19,7 @@ from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
 ROUNDS, WIDER = 10, 3
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
 ON = ((1e-5, 1e-2), (1e-4, 1e-1), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Part of an uncertainty, by way of which the search goes where it finds no motion for all of it.
+# Part of an uncertainty, by which the search goes first where it finds no motion for all of it.
 PART = 0.5
 
 

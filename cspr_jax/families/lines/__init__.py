@@ -2,7 +2,7 @@
 
 Along a straight line the limits of the tensions are half-planes of path coordinate and path acceleration. Where these
 and nothing else bind, the least duration of a law is a formula, and so is that of any motion along the line; other
-limits need a search over the duration and, for the S-model, over the share p / T of its acceleration. Each motion
+limits need a search over the duration and, for the S-model, over the fraction p / T of its acceleration. Each motion
 that is found is proved between the samples; a lower bound of the duration of any motion stands beside its duration.
 
 Source: Boralugoda's thesis (feasible accelerations, S-model, least time: tables 4.1 to 4.3).

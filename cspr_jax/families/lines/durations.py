@@ -69,8 +69,8 @@ class Durations:
 
 def moving(limits: Limits) -> tuple[str, ...]:
     """Limits that depend on how the effector moves."""
-    given = [name for name in MOVING if getattr(limits, name) is not None]
-    return tuple(name for name in given if name != "tension_min" or np.asarray(limits.tension_min).any())
+    limit_names = [name for name in MOVING if getattr(limits, name) is not None]
+    return tuple(name for name in limit_names if name != "tension_min" or np.asarray(limits.tension_min).any())
 
 
 def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:

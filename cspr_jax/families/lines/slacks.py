@@ -70,8 +70,8 @@ class LineSlacks:
     @property
     def names(self) -> tuple[str, ...]:
         """Groups of slacks: taut cables, and the limits in their order."""
-        given = {*self.low, *self.largest}
-        return tuple(name for name in (TAUT, *(limit.name for limit in LIMITS)) if name in given)
+        set_names = {*self.low, *self.largest}
+        return tuple(name for name in (TAUT, *(limit.name for limit in LIMITS)) if name in set_names)
 
     @property
     def tightest(self) -> str:

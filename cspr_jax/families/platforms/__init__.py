@@ -3,7 +3,7 @@
 Position and orientation swing together, so that the cables of a robot that is in equilibrium at P0 stay taut while its
 platform goes to poses far from it. Tensions, determinant, limits on the pose and contacts are proved on blocks of time:
 they are analytic functions of complex time, so that the error of polynomials through their values at Chebyshev nodes
-can be bounded. On more than six cables searches look at samples, and what they choose is proved by tensions that
+can be bounded. On more than six cables searches take samples, and what they choose is proved by tensions that
 balance it throughout blocks.
 
 Source: Dion-Gauvin's thesis, chapter 3 (sections 3.7 to 3.13: oscillating SLERP, beta-hat, accessible and attainable

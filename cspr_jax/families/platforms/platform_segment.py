@@ -253,7 +253,7 @@ def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Arra
 
 def take_segments(segments: PlatformSegment, index: np.ndarray) -> PlatformSegment:
     """Segments chosen from many."""
-    # `take` is four times as fast as an index where a leaf is no vector.
+    # `take` is four times as fast as an index where an array is no vector.
     index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
     return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
 
@@ -262,7 +262,7 @@ class Motions(NamedTuple):
     """Motions of a platform.
 
     Fields:
-        segments: leaves (n, ...), of the parity of `arcs`.
+        segments: arrays (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs of each.
     """
 

@@ -120,9 +120,9 @@ def launched(problem: Problem, launch: Launch, durations: list[float | None], ch
 
 
 def _searched(problem: Problem, launch: Launch, durations: list[float | None], parts) -> LaunchSequence:
-    given = jnp.asarray([1.0 if time is None else time for time in durations])
+    initial = jnp.asarray([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None], int)
-    arguments: Any = (problem, launch, given, free)
+    arguments: Any = (problem, launch, initial, free)
     shortest, longest = duration_bounds(problem, np.asarray(launch.points))
     bounds = [(shortest, longest)] * len(free)
     bounds += [(EARLIEST, LATEST)] if launch.release is None else []

@@ -54,8 +54,10 @@ class Ending(NamedTuple):
 
     def is_over(self, is_optimal: Float[np.ndarray, "l"]) -> bool:
         """Tell whether searches end now."""
-        now = time.monotonic()
-        return now > self.until or (now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all()))
+        time_now = time.monotonic()
+        return time_now > self.until or (
+            time_now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
+        )
 
 
 NEVER = Ending()
@@ -133,8 +135,8 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
         is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
         is_late = ending.is_over(result.is_optimal)
         is_over = is_optimal | (number == STEPS) | (waited > PATIENCE) | is_late
-        for found, values in zip(result.unknowns, points.unknowns.take(is_over), strict=True):
-            found[indices[is_over]] = values
+        for results, values in zip(result.unknowns, points.unknowns.take(is_over), strict=True):
+            results[indices[is_over]] = values
         result.is_optimal[indices[is_over]], result.steps[indices[is_over]] = is_optimal[is_over], number
         if is_over.all():
             return not is_late

@@ -43,7 +43,8 @@ class Step(NamedTuple):
 
 
 class _Bordered(NamedTuple):
-    # Newton's equations of segments, (l, s, ...): of inner coordinates in bands, with borders, and right-hand sides.
+    # Newton's equations of segments, (l, s, ...): of inner coordinates as banded matrices, with borders, and right-hand
+    # sides.
     banded: np.ndarray
     beside: np.ndarray
     border: np.ndarray

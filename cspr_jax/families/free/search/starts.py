@@ -94,7 +94,7 @@ def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, max_arc
 
 
 def deflection_profile(tau: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """How far motions are deflected, at most 1 half-way; at the ends neither position nor velocity changes."""
+    """How far motions are deflected, at most 1 in the middle; at the ends neither position nor velocity changes."""
     return 16.0 * (tau * (1.0 - tau)) ** 2
 
 

@@ -1,7 +1,7 @@
 """Motions that are sought together, and their unknowns: control points, durations, accelerations at poses, levels.
 
-A motion is at a pose at each end of its segments, with a given velocity there, and an acceleration that the segments at
-both sides share. So the outer three control points at each end follow from the duration and the acceleration.
+A motion is at a pose at each end of its segments, with a given velocity there, and an acceleration that both of its
+segments have. So the outer three control points at each end follow from the duration and the acceleration.
 """
 
 from __future__ import annotations

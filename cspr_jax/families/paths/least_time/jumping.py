@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, REPEATS = 32, 2
-# Width of a cell over that of all below which u changes within it as is given.
+# Width of a cell over that of all below which u changes within it as a guess says.
 NARROW = 0.5
 
 
@@ -92,20 +92,20 @@ def jumping_motions(paths: Sequence[Discrete], guesses: Sequence[PathAcceleratio
     """
     u_rates = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, u_rates)
-    given = {
+    guessed = {
         k: guess.u_rate(paths[k].grid.nodes)
         for k, guess in enumerate(guesses)
         if guess is not None and not _is_passable(solutions[k])
     }
-    for k, solution in zip(given, solved_together([paths[k] for k in given], list(given.values())), strict=True):
-        solutions[k], u_rates[k] = solution, given[k]
+    for k, solution in zip(guessed, solved_together([paths[k] for k in guessed], list(guessed.values())), strict=True):
+        solutions[k], u_rates[k] = solution, guessed[k]
     motions = [
         Jumping(run_of(solution, path, u_rate), u_rate, solution)
         for solution, path, u_rate in zip(solutions, paths, u_rates, strict=True)
     ]
     going = [k for k, motion in enumerate(motions) if motion.run is not None]
     for _ in range(REPEATS):
-        changes = [_changes(solutions[k], paths[k].grid.width, given.get(k)) for k in going]
+        changes = [_changes(solutions[k], paths[k].grid.width, guessed.get(k)) for k in going]
         following = solved_together([paths[k] for k in going], changes)
         better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
         for k, solution, change, run in zip(going, following, changes, better, strict=True):
@@ -119,10 +119,10 @@ def _is_passable(solution: GridSolution) -> bool:
     return bool(solution.empty < 0 and solution.is_start)
 
 
-def _changes(solution: GridSolution, width: np.ndarray, given: np.ndarray | None) -> np.ndarray:
+def _changes(solution: GridSolution, width: np.ndarray, guessed: np.ndarray | None) -> np.ndarray:
     # In cells that are narrow since the path all but turns back there, u changes as is given.
     change = minmod_rates(np.asarray(solution.u), width)
-    return change if given is None else np.where(width < NARROW * width.mean(), given, change)
+    return change if guessed is None else np.where(width < NARROW * width.mean(), guessed, change)
 
 
 def again(paths: Sequence[Discrete], u_rates: Sequence[np.ndarray]) -> list[PathSpeeds | None]:

@@ -41,7 +41,7 @@ def attainable(
     margins: bool = True,
 ) -> PlatformMotionAnswers:
     """Smallest numbers of arcs from rest to orientations at positions."""
-    representatives, inverse = _once(checker, positions, angles, z0, symmetry)
+    representatives, inverse = _once(positions, angles, z0, symmetry)
 
     def part(indices):
         indices = representatives[indices]
@@ -66,7 +66,7 @@ def attained(
 
     `attainable` also tells how, or why not; this function does half of the work.
     """
-    representatives, inverse = _once(checker, positions, angles, z0, symmetry)
+    representatives, inverse = _once(positions, angles, z0, symmetry)
     each = rounds(values) if tried is None else (tried,)
 
     def part(indices):
@@ -96,7 +96,7 @@ def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
-def _once(checker: MotionChecker, positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+def _once(positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
     # Find the orientations that represent all, and the index of each orientation's representative among them.
     representatives, inverse = np.unique(alike(symmetry, np.c_[positions, z0], angles), return_inverse=True)
     return representatives, inverse.ravel()

@@ -1,4 +1,4 @@
-"""Enclosures of a platform on its way, for bounds over robots that differ a little; vectors are in platform axes."""
+"""Enclosures of a moving platform, for bounds over robots that differ a little; vectors are in platform axes."""
 
 from __future__ import annotations
 

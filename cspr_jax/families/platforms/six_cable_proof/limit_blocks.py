@@ -48,7 +48,7 @@ class Node(NamedTuple):
     z0: Array
 
 
-class CableBounds(NamedTuple):
+class CableEllipseBounds(NamedTuple):
     """Bounds on an ellipse of complex time, one (n,) a cable.
 
     Fields:
@@ -96,14 +96,14 @@ class LimitOnBlocks(NamedTuple):
     Fields:
         width: number of values that stand for the quantity.
         values: takes a node and the limit (n_cables,); gives the values in pairs of (n,).
-        bounds: takes `CableBounds` and the limit; gives a bound of the magnitude of each value.
+        bounds: takes `CableEllipseBounds` and the limit; gives a bound of the magnitude of each value.
         slacks: takes the enclosed values, the limit over the scale of slacks, and whether the limit is a lower one;
             gives upper bounds of the smallest slacks at the nodes (m, n), and a lower bound of all slacks (n,).
     """
 
     width: int
     values: Callable[[Node, Array], list[Pair]]
-    bounds: Callable[[CableBounds, Array], list[Array]]
+    bounds: Callable[[CableEllipseBounds, Array], list[Array]]
     slacks: Callable[[Enclosed, Array, bool], Pair]
 
 
@@ -128,7 +128,7 @@ def _tensions(node: Node, _: Array) -> list[Pair]:
     return _paired([x * length for x, length in zip(node.kappa, lengths, strict=True)])
 
 
-def _tension_bounds(cable: CableBounds, _: Array) -> list[Array]:
+def _tension_bounds(cable: CableEllipseBounds, _: Array) -> list[Array]:
     each = zip(cable.kappa, cable.rays, cable.is_straight, strict=True)
     return [jnp.where(is_straight, kappa * ray / cable.z0, jnp.inf) for kappa, ray, is_straight in each]
 
@@ -156,7 +156,7 @@ def _speeds(node: Node, limit: Array) -> list[Pair]:
     return _paired(values)
 
 
-def _speed_bounds(cable: CableBounds, limit: Array) -> list[Array]:
+def _speed_bounds(cable: CableEllipseBounds, limit: Array) -> list[Array]:
     return [
         (ray / cable.z0) ** 2 * (1.0 + rate**2 / (cable.squared * limit[k] ** 2))
         for k, (ray, rate) in enumerate(zip(cable.rays, cable.ray_rates, strict=True))
@@ -185,7 +185,7 @@ def _accelerations(node: Node, limit: Array) -> list[Pair]:
     return pairs
 
 
-def _acceleration_bounds(cable: CableBounds, limit: Array) -> list[Array]:
+def _acceleration_bounds(cable: CableEllipseBounds, limit: Array) -> list[Array]:
     bounds = []
     for k, (ray, rate, acceleration) in enumerate(
         zip(cable.rays, cable.ray_rates, cable.ray_accelerations, strict=True)

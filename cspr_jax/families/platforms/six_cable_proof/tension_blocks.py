@@ -32,7 +32,7 @@ from cspr_jax.families.platforms.six_cable_proof.complex_bounds import (
 from cspr_jax.families.platforms.six_cable_proof.limit_blocks import (
     QUANTITIES,
     STRAIGHT,
-    CableBounds,
+    CableEllipseBounds,
     Enclosed,
     Node,
     Pair,
@@ -284,7 +284,7 @@ def _magnitude_bounds(problem: Problem, block: _Block, bounds: EllipseBounds, al
         for lever in arms
     ]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
-    cable_bounds = CableBounds(
+    cable_bounds = CableEllipseBounds(
         kappa, rays, ray_rates, ray_accelerations, is_straight, squared, z0, bounds.speed, bounds.second_derivative
     )
     largest = [*kappa, full, jnp.zeros_like(full)]

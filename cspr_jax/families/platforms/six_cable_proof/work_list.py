@@ -77,7 +77,7 @@ class WorkList:
         halved = 0
         for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
             is_open = self._apply(blocks, bounds, last=halved >= HALVINGS)
-            # Where a limit is touched all along a path, as on level ones along the floor, blocks stay open for long.
+            # If a limit is touched all along a path, as on level ones along the floor, blocks stay open for long.
             fraction = np.where((bounds.bound > -SIX_CABLES_UNDECIDED).all(0), 1.0 / TOUCHING, 1.0)
             self.is_stuck |= np.bincount(blocks.row, fraction * is_open, len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
