@@ -6,7 +6,7 @@ import pytest
 
 from cspr_jax.families.platforms.six_cable_proof.work_list import smallest_nodes
 from cspr_jax.motion.amplitudes import from_polynomial, named
-from cspr_jax.verification.bounds.blocks import INSTANTS, Parts, growing, parts_of_arcs
+from cspr_jax.verification.bounds.blocks import SAMPLES, Parts, growing, parts_of_arcs
 
 AMPLITUDES = {
     "quintic": named("quintic"),
@@ -40,7 +40,7 @@ def test_blocks_cover_all_of_time(name, how):
 def test_parts_grow_with_the_amplitude():
     """The ramps at the values of A themselves, and blocks that are longer where fewer parts are asked for."""
     amplitude = AMPLITUDES["effective"]
-    tau = np.linspace(0.0, 1.0, INSTANTS)
+    tau = np.linspace(0.0, 1.0, SAMPLES)
     parts, values = growing(amplitude, *RAMPS), np.asarray(amplitude.at(tau))
     np.testing.assert_allclose(parts.at_cusps, 1.0 + 4.0 * values, atol=1e-12)
     np.testing.assert_allclose(parts.at_middles, 2.0 + 7.0 * values, atol=1e-12)
@@ -60,8 +60,8 @@ def test_parts_grow_with_the_amplitude():
 @pytest.mark.parametrize("arcs", [1, 2, 5, 20])
 def test_parts_of_an_arc_between_cusps(arcs):
     """Cusps are where an arc ends: whole numbers of arcs, whether that is odd or even."""
-    parts = Parts(np.full(INSTANTS, 2.0), np.full(INSTANTS, 6.0)).of(arcs)
-    at = np.interp(np.arange(2 * arcs + 1) / (2.0 * arcs), np.linspace(0.0, 1.0, INSTANTS), parts)
+    parts = Parts(np.full(SAMPLES, 2.0), np.full(SAMPLES, 6.0)).of(arcs)
+    at = np.interp(np.arange(2 * arcs + 1) / (2.0 * arcs), np.linspace(0.0, 1.0, SAMPLES), parts)
     np.testing.assert_allclose(at[::2], 2.0, atol=0.01)
     np.testing.assert_allclose(at[1::2], 6.0, atol=0.01)
 

@@ -124,7 +124,7 @@ def certifier_of(problem, kind):
 def bounds_of(certifier, problem, segments, arcs, blocks, *, order=0, margins=False, reduced=False):
     """Bounds on blocks, one a motion."""
     motions = segments, arcs, determinant_at_rest(problem, segments)
-    return certifier.bounds(order, blocks, motions, margins=margins, reduced=least)
+    return certifier.bounds(order, blocks, motions, margins=margins, reduced=reduced)
 
 
 def block_breaks(count, seed, kind, robot, limits):
@@ -137,7 +137,9 @@ def block_breaks(count, seed, kind, robot, limits):
     stop = np.minimum(start + rng.uniform(0.05, 0.4, count) / arcs, 1.0)
     # As margins need them, and as verdicts do, from rounded values.
     found, rough = (
-        bounds_of(certifier_of(problem, kind), problem, segments, arcs, Blocks(np.arange(count), start, stop), reduced=x)
+        bounds_of(
+            certifier_of(problem, kind), problem, segments, arcs, Blocks(np.arange(count), start, stop), reduced=x
+        )
         for x in (False, True)
     )
     broken, gaps = 0, []
@@ -368,7 +370,7 @@ def test_slacks_at_nodes_are_no_lower_than_they_are(limits, least):
     # The middle is a node.
     middle, half = np.concatenate(flat), 1e-4 / arcs[row]
     problem, blocks = problem_of(robot, limits and limits_of(**limits)), Blocks(row, middle - half, middle + half)
-    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, reduced=least)
+    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, reduced=reduced)
     tau, doubtful = blocks.times(chebyshev.nodes()[:, None]), 0
     for i, k in enumerate(row):
         true = sampled(robot, theirs[k], int(arcs[k]), betas[k], tau[:, i], limits)

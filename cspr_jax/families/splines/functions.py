@@ -77,7 +77,9 @@ def function_motion(
         raise InputError("times", None, "must be one of jax.numpy", problem="jax cannot follow it") from error
     allowed = ((3,), (7,)) if is_platform else ((3,),)
     if shape not in allowed:
-        raise InputError("times", None, f"must give values of shape {' or '.join(map(str, allowed))}", problem=f"{shape}")
+        raise InputError(
+            "times", None, f"must give values of shape {' or '.join(map(str, allowed))}", problem=f"{shape}"
+        )
     back = jnp.asarray(reference * np.array([1.0, -1.0, -1.0, -1.0]))
 
     def inward(t: Array) -> Array:
