@@ -370,7 +370,7 @@ def test_slacks_at_nodes_are_no_lower_than_they_are(limits, least):
     # The middle is a node.
     middle, half = np.concatenate(flat), 1e-4 / arcs[row]
     problem, blocks = problem_of(robot, limits and limits_of(**limits)), Blocks(row, middle - half, middle + half)
-    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, reduced=reduced)
+    found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, reduced=least)
     tau, doubtful = blocks.times(chebyshev.nodes()[:, None]), 0
     for i, k in enumerate(row):
         true = sampled(robot, theirs[k], int(arcs[k]), betas[k], tau[:, i], limits)
