@@ -99,7 +99,7 @@ def _three_cables(kernel: Callable, work: three_cables.ThreeCableWork) -> float:
         arcs = np.arange(1, three_cables.MAX_ARCS + 1)[first::2]
         s = jax.tree.map(np.asarray, segments)
         fields = [s.start_radius, s.end_radius - s.start_radius, s.precession, s.sense, *s.tilt.T]
-        fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
+        fields += [*s.coupling.reshape(-1, 6).T, *s.twist.T]
         table = screen.sample_table(work.problem.amplitude, arcs, tau, np.float32)
         inputs = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
         out = _lined(np.zeros((len(arcs), len(s.rate))))

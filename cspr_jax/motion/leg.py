@@ -74,10 +74,10 @@ class Leg(abc.ABC):
         """Keep the poses; a family refuses what it cannot join."""
         self.waypoints = waypoints
 
-    def _refuse(self, *keys: str) -> None:
+    def _refuse(self, *names: str) -> None:
         # Refuse keys of poses that other families take; at its first pose another leg may have taken them.
         for i, pose in enumerate(self.waypoints.poses[1:], start=1):
-            for key in keys:
+            for key in names:
                 if getattr(pose, key) is not None:
                     name = f"{self.waypoints.name(i)}.{key}"
                     raise ConfigError(

@@ -15,8 +15,7 @@ from cspr_jax.families.swings.proof.margins import margins
 from cspr_jax.families.swings.transitions import envelope_oscillations as counts
 from cspr_jax.families.swings.transitions import zero_tension
 from cspr_jax.families.swings.transitions.envelopes import lower_envelope, proved_envelope
-from cspr_jax.families.swings.transitions.oscillations import transitions_to
-from cspr_jax.families.swings.transitions.transition_margins import transition_margins
+from cspr_jax.families.swings.transitions.oscillations import transition_margins, transitions_to
 from cspr_jax.motion.amplitudes import derivatives, named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.limits import Limits

@@ -9,7 +9,7 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.families.swings import hypocycloid
-from cspr_jax.families.swings.proof.slacks import instant, normalised_pseudotensions
+from cspr_jax.families.swings.proof.slacks import normalised_pseudotensions, swing_state
 from cspr_jax.motion.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.robots.model import point_mass
 
@@ -34,7 +34,7 @@ SEGMENTS = jax.jit(jax.vmap(lambda *given: hypocycloid.segment(*given[:4], odd=g
 MOTION, SWING, KAPPA = along(hypocycloid.motion), along(one_swing), along(normalised_pseudotensions)
 DURATION = jax.jit(jax.vmap(hypocycloid.duration))
 INFINITY = jax.jit(jax.vmap(hypocycloid.feasibility_at_infinity, in_axes=(0, None)))
-ETA = along(lambda *arguments: instant(*arguments).eta)
+ETA = along(lambda *arguments: swing_state(*arguments).eta)
 LIMIT = jax.jit(jax.vmap(jax.vmap(hypocycloid.limit_of_many_arcs, (None, None, 0)), (0, None, None)))
 
 

@@ -16,8 +16,8 @@ from cspr_jax.families.swings import hypocycloid
 from cspr_jax.families.swings.proof import criteria, margins
 from cspr_jax.families.swings.proof import verdicts as proof
 from cspr_jax.families.swings.proof.blocks import blocks
-from cspr_jax.families.swings.proof.limit_slacks import least_lengths, pace_bounds
-from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.families.swings.proof.limit_slacks import least_lengths, motion_bounds
+from cspr_jax.families.swings.proof.slacks import interval_bounds, row_bounds, swing_state, taut_bounds
 from cspr_jax.families.swings.proof.verdicts import SMALL, prove, tolerance
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
@@ -67,12 +67,12 @@ def instants(function):
 
 
 def kappa_eta(robot, limits, amplitude, segment, arcs, tau):
-    now = instant(segment, amplitude, arcs, tau)
+    now = swing_state(segment, amplitude, arcs, tau)
     return jnp.stack([*now.kappa, now.eta])
 
 
 def kappa_eta_bounds(segment, amplitude, arcs, start, stop):
-    over = stretch(segment, amplitude, arcs, start, stop)
+    over = interval_bounds(segment, amplitude, arcs, start, stop)
     each = zip(taut_bounds(segment, arcs, over), row_bounds(segment, arcs, over, segment.tilt), strict=True)
     return jnp.stack([jnp.append(kappa, eta) for kappa, eta in each])
 
@@ -161,8 +161,8 @@ LEAST_LENGTHS = jax.jit(
             least_lengths(
                 robot,
                 segment,
-                (over := stretch(segment, amplitude, arcs, start, stop)),
-                pace_bounds(segment, arcs, over)[0],
+                (over := interval_bounds(segment, amplitude, arcs, start, stop)),
+                motion_bounds(segment, arcs, over)[0],
                 row_bounds(segment, arcs, over, segment.tilt),
             )
         ),
@@ -301,8 +301,12 @@ def extended_kappa_eta(segment, amplitude, arcs, tau):
         (np.cos(slow) * a + np.sin(slow) * b, np.cos(slow) * b - np.sin(slow) * a) for a, b in ((c_r, c_t), (d_r, d_t))
     )
     eta = 1 + exact["tilt"][:, :1] * c[0] + exact["tilt"][:, 1:] * c[1]
-    pull, twist = exact["pull"][..., None], exact["twist"][..., None]
-    force = pull[:, :, 0] * d[0][:, None] + pull[:, :, 1] * d[1][:, None] + twist * (c[0] * d[1] - c[1] * d[0])[:, None]
+    coupling, twist = exact["coupling"][..., None], exact["twist"][..., None]
+    force = (
+        coupling[:, :, 0] * d[0][:, None]
+        + coupling[:, :, 1] * d[1][:, None]
+        + twist * (c[0] * d[1] - c[1] * d[0])[:, None]
+    )
     return np.stack([*np.moveaxis(eta[:, None] + force, 1, 0), eta], -1)
 
 

@@ -1,9 +1,9 @@
-"""Harmonic ellipses: turns on ellipses, circles and lines of any amplitude, and ways from one to another.
+"""Harmonic ellipses: turns on ellipses, circles and lines of any amplitude, and transfers from one to another.
 
 A point mass that moves as x = C + a cos(wt) + b sin(wt) has pseudotensions of one harmonic each, so that verdict,
 margin and the interval of feasible frequencies are formulas; at the natural frequency every ellipse below the spools is
 feasible whose centre lies below their hull. Rest is an ellipse without axes: from rest, to rest and from one ellipse to
-another, centre, axes, frequency and orientation go over into each other along an amplitude function, in the least
+another, centre, axes, frequency and orientation go over into each other along an amplitude function, in the smallest
 number of arcs that is proved.
 
 Source: Gosselin, Ren, Foucault (ICRA 2012); Mottola, Gosselin, Carricato (J. Mechanisms and Robotics 10, 2018, 031004);
@@ -17,11 +17,10 @@ Files, each importing only from those above it:
     motion                 motion on ellipses and between them
     frequencies            frequencies that a plan leaves open
     rotation_frequencies   natural frequencies of rotation of a platform at rest
-    transfers              least numbers of arcs between two ellipses
+    transfers              smallest numbers of arcs between two ellipses
     releases               ellipses from which an object is released
     leg                    ellipses in a plan
-    turns                  proofs of turns on many ellipses at once
-    cells                  answers of turns on many ellipses
+    cells                  proofs and answers of turns on many ellipses
     map                    maps of feasible frequencies and margins
     swing_range            least speeds of throws from ellipses
     swing_range_map        maps of these

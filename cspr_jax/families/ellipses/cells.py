@@ -4,26 +4,36 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from typing import TYPE_CHECKING
 
+import jax
 import numpy as np
 
 from cspr_jax.families.ellipses import harmonics
 from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import SpoolHull, edge_ends, formula_hull
-from cspr_jax.families.ellipses.turns import Turns, turn_proofs
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
+from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import answers_of
+from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
-# Roundings of a margin, in parts of the largest number in it, with room.
+# Roundings of a margin, in parts of the largest number in it, with a reserve.
 MARGIN_ERROR = 256.0 * float(np.finfo(float).eps)
+BATCH = 64  # blocks of which bounds are computed at a time
+TOGETHER = 1024  # turns that are proved at once
+# Not less than a turn, whatever the rounding.
+TURN = math.nextafter(2.0 * math.pi, 7.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +93,7 @@ def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.nda
     tension, other = nothing.copy(), nothing.copy()
     if hull is None or limits_set(problem.limits):
         open_cells = np.flatnonzero(has_frequency & ((verdict == 0) | (verdict == Verdict.UNDECIDED.value)))
-        chosen = Turns(Ellipse(*(np.asarray(leaf)[open_cells] for leaf in ellipses)), used[open_cells])
+        chosen = Turns(Ellipse(*(np.asarray(array)[open_cells] for array in ellipses)), used[open_cells])
         answers = answers_of(turn_proofs(problem, chosen), chosen.frequencies)
         verdict[open_cells], tension[open_cells] = answers.verdict, answers.margin
         other[open_cells] = answers.limit_margin
@@ -97,15 +107,15 @@ def _margins(
 ) -> tuple[np.ndarray, np.ndarray]:
     # Smallest values of the edges and of the depth, (n, n_edges + 1), and what rounding may be of each, (n, 1).
     margins = harmonics.of_many(harmonics.harmonic_margins, hull, ellipses, frequencies)
-    centre, a, b = (np.linalg.norm(leaf, axis=1) for leaf in ellipses)
+    centre, a, b = (np.linalg.norm(array, axis=1) for array in ellipses)
     normal = np.asarray(hull.normal)
-    slope, steepest = float(np.linalg.norm(normal)), float(np.linalg.norm(np.asarray(hull.edges), axis=1).max())
+    normal_norm, steepest = float(np.linalg.norm(normal)), float(np.linalg.norm(np.asarray(hull.edges), axis=1).max())
     depth = np.abs(np.asarray(ellipses.centre) @ normal)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        rise, far = slope * (a + b) / depth, 1.0 + slope * centre / depth
+        rise, far = normal_norm * (a + b) / depth, 1.0 + normal_norm * centre / depth
         e = 1.0 + frequencies**2 * depth / float(hull.gravity)
-        size = (1.0 + steepest * centre) * (1.0 + rise * (1.0 + e)) + e * steepest * (a + b)
-        rounding = MARGIN_ERROR * far * (1.0 + steepest * float(spool_radius(robot))) * size
+        magnitude = (1.0 + steepest * centre) * (1.0 + rise * (1.0 + e)) + e * steepest * (a + b)
+        rounding = MARGIN_ERROR * far * (1.0 + steepest * float(spool_radius(robot))) * magnitude
     return margins, np.nan_to_num(rounding, nan=np.inf)[:, None]
 
 
@@ -128,3 +138,45 @@ def _binding(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -
     ends = edge_ends(np.asarray(robot.base_points), robot.dof)
     numbers = [pairs.index(tuple(sorted(pair))) + 1 for pair in ends.tolist()]
     return np.array([*numbers, len(pairs) + 1])[first]
+
+
+@dataclasses.dataclass(frozen=True)
+class Turns:
+    """One turn on each of n ellipses, with its angle as the time, so that slower and slower turns have a limit.
+
+    Fields:
+        ellipses: leaves (n, 3).
+        frequencies: (n,) rad/s; 0: the limit of slow turns.
+    """
+
+    ellipses: Ellipse
+    frequencies: np.ndarray
+
+    def bounds(
+        self, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
+    ) -> StateBounds:
+        """Bounds of the states over blocks."""
+        chosen = Ellipse(*(np.asarray(array)[motion] for array in self.ellipses))
+        return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), batch_size=BATCH)
+
+
+@persistent_jit
+def _bounds(blocks: tuple) -> StateBounds:
+    def one(block: tuple) -> StateBounds:
+        (centre, a, b), rate, start, end = block
+        angle = AffineBounds(0.5 * (start + end), 0.5 * (end - start), 0.0 * start) * (1.0 / math.pi)
+        sine, cosine = sincospi(angle.each(lambda x: x[None]))
+        outward, forward = cosine * a + sine * b, cosine * b - sine * a
+        return StateBounds(outward + centre, forward * rate, outward * -(rate**2))
+
+    return jax.vmap(one)(blocks)
+
+
+def turn_proofs(problem: Problem, turns: Turns) -> list[MotionProof]:
+    """Proofs of one turn on each ellipse."""
+    proofs: list[MotionProof] = []
+    for first in range(0, len(turns.frequencies), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        chunk = Turns(Ellipse(*(array[part] for array in turns.ellipses)), turns.frequencies[part])
+        proofs += proofs_of(problem, chunk.bounds, np.full(len(chunk.frequencies), TURN))
+    return proofs

@@ -32,9 +32,11 @@ from cspr_jax.verification.criteria import criteria
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Angles of a turn where there are many frequencies, and for one alone; frequencies of a first look, halvings that
-# follow, and the share by which an end is kept off.
-ANGLES, FINE, LOOKS, HALVINGS, INSIDE = 128, 4096, 65, 40, 1e-5
+ANGLES = 128  # samples of a turn where there are many frequencies
+FINE = 4096  # for one frequency alone
+GRID = 65  # frequencies
+HALVINGS = 40  # that follow
+INSIDE = 1e-5  # fraction by which an end is kept off
 # Factors of the natural frequency between which a frequency is sought where no formula bounds it.
 WIDEST = 100.0
 SLOWER = "a number: the slower this ellipse, the larger the margin"
@@ -48,13 +50,13 @@ def chosen_frequency(
     if rule == "natural":
         return natural
     if rule == "best" and hull is not None:
-        best = float(harmonics.of_many(harmonics.best_frequency, hull, _row(ellipse))[0])
+        best = float(harmonics.of_many(harmonics.best_frequency, hull, _batched(ellipse))[0])
         if best == 0.0:
             raise InputError("frequency", rule, SLOWER)
         return natural if math.isnan(best) else best
     low, high = natural / WIDEST, natural * WIDEST
     if hull is not None:
-        first, last = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, _row(ellipse)))
+        first, last = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, _batched(ellipse)))
         if math.isnan(first):
             return natural
         low, high = max(low, first), min(high, last)
@@ -88,8 +90,8 @@ def natural_frequency(problem: Problem, ellipse: Ellipse, rule: str = "natural")
     return math.sqrt(float(problem.robot.gravity) / depth)
 
 
-def _row(ellipse: Ellipse) -> Ellipse:
-    return Ellipse(*(np.asarray(leaf)[None] for leaf in ellipse))
+def _batched(ellipse: Ellipse) -> Ellipse:
+    return Ellipse(*(np.asarray(array)[None] for array in ellipse))
 
 
 def sampled_slacks(
@@ -106,8 +108,8 @@ def sampled_slacks(
     outward = ellipse.cosine * cosine + ellipse.sine * sine
     forward = ellipse.sine * cosine - ellipse.cosine * sine
     rate = frequencies[:, None, None]
-    place = np.broadcast_to(ellipse.centre + outward, (len(frequencies), count, 3))
-    states = [x.reshape(-1, 3) for x in np.broadcast_arrays(place, rate * forward, -(rate**2) * outward)]
+    position = np.broadcast_to(ellipse.centre + outward, (len(frequencies), count, 3))
+    states = [x.reshape(-1, 3) for x in np.broadcast_arrays(position, rate * forward, -(rate**2) * outward)]
     if rotation is not None:
         angles = np.tile(angle[:, 0], len(frequencies)), np.repeat(frequencies, count)
         states += [np.asarray(x) for x in _rotations(rotation, *map(jnp.asarray, angles))]
@@ -121,21 +123,21 @@ def sampled_slacks(
 @persistent_jit
 def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, ...]:
     # Rotations, angular velocities and accelerations at angles of turns with rates, leaves (n, ...).
-    still = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))
+    static = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))
 
     def one(angle: Array, rate: Array) -> tuple[Array, ...]:
         p, q = rotation.last
         cosine, sine = jnp.cos(angle), jnp.sin(angle)
         psi = p * cosine + q * sine
-        return rotation_state(rotation, still, (psi, rate * (q * cosine - p * sine), -(rate**2) * psi))[:3]
+        return rotation_state(rotation, static, (psi, rate * (q * cosine - p * sine), -(rate**2) * psi))[:3]
 
     return jax.vmap(one)(angles, rates)
 
 
 def _outermost(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
     # The fastest, or the slowest, frequency whose samples are feasible.
-    looks = np.geomspace(max(low, natural / WIDEST), high, LOOKS)
-    order = looks[::-1] if rule == "fastest" else looks
+    grid = np.geomspace(max(low, natural / WIDEST), high, GRID)
+    order = grid[::-1] if rule == "fastest" else grid
     feasible = np.flatnonzero(slack(order) > 0.0)
     if not len(feasible):
         return natural
@@ -152,14 +154,14 @@ def _outermost(slack: Callable, low: float, high: float, natural: float, rule: s
 
 def _largest(slack: Callable, low: float, high: float, natural: float) -> float:
     # The frequency whose smallest sampled slack is the largest: a grid that is narrowed about its best point.
-    looks = np.geomspace(low, high, LOOKS)
-    values = slack(looks)
+    grid = np.geomspace(low, high, GRID)
+    values = slack(grid)
     if not values.max() > 0.0:
         return natural
     if values.argmax() == 0 and low <= natural / WIDEST:
         raise InputError("frequency", "best", SLOWER)
     for _ in range(HALVINGS // 4):
         best = int(values.argmax())
-        looks = np.linspace(looks[max(best - 1, 0)], looks[min(best + 1, LOOKS - 1)], LOOKS)
-        values = slack(looks)
-    return float(looks[values.argmax()])
+        grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, GRID - 1)], GRID)
+        values = slack(grid)
+    return float(grid[values.argmax()])

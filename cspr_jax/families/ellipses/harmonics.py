@@ -32,8 +32,8 @@ from cspr_jax.numerics.batches import in_batches, in_parts
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Ellipses in a batch, and in the part of one of two threads.
-BATCH, LARGEST = 16384, 1 << 20
+BATCH = 16384  # ellipses
+LARGEST = 1 << 20  # ellipses in the part of one of two threads
 # Halvings that narrow e to the last bit.
 HALVINGS = 64
 
@@ -60,14 +60,14 @@ class _Edge(NamedTuple):
 
 
 class _Terms(NamedTuple):
-    # Edge by edge, since XLA computes a stack once for each of its elements; depth of the centre, () m, and the size of
+    # Edge by edge, since XLA computes a stack once for each of its elements; depth of the centre, () m, and the norm of
     # the harmonic of the depth, () m.
     edges: list[_Edge]
     depth: Array
     swing: Array
 
 
-def _size(pair: tuple[Array, Array]) -> Array:
+def _norm(pair: tuple[Array, Array]) -> Array:
     return jnp.sqrt(pair[0] * pair[0] + pair[1] * pair[1])
 
 
@@ -86,13 +86,13 @@ def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
         tilting = (fraction * swing[0], fraction * swing[1])
         return _Edge(constant, tilting, (flat(ellipse.cosine) - tilting[0], flat(ellipse.sine) - tilting[1]))
 
-    return _Terms([of_edge(gradient) for gradient in hull.edges], depth, _size(swing))
+    return _Terms([of_edge(gradient) for gradient in hull.edges], depth, _norm(swing))
 
 
 def _slacks(terms: _Terms, e: Array) -> list[Array]:
     # Smallest kappa of each edge.
     return [
-        constant - _size((tilting[0] + e * pulling[0], tilting[1] + e * pulling[1]))
+        constant - _norm((tilting[0] + e * pulling[0], tilting[1] + e * pulling[1]))
         for constant, tilting, pulling in terms.edges
     ]
 
@@ -155,13 +155,13 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
 
-    # The smallest of functions that bend downwards bends downwards: it rises up to its largest value.
+    # The smallest of concave functions is concave: it rises up to its largest value.
     def halved(_, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (ends[0] + ends[1])
-        falls = jnp.stack([_falls(edge, middle) for edge in terms.edges])
-        fall = falls[jnp.argmin(jnp.stack(_slacks(terms, middle)))]
+        rates = jnp.stack([_decrease(edge, middle) for edge in terms.edges])
+        rate = rates[jnp.argmin(jnp.stack(_slacks(terms, middle)))]
         # A level slack, as without axes, is best taken at the frequency nearest to the natural one.
-        rises = (fall < 0.0) | ((fall == 0.0) & (middle < 0.0))
+        rises = (rate < 0.0) | ((rate == 0.0) & (middle < 0.0))
         return jnp.where(rises, middle, ends[0]), jnp.where(rises, ends[1], middle)
 
     # Beside the natural frequency, e = 0, nothing helps an edge whose slack e does not change.
@@ -172,8 +172,8 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
     return jnp.where(_exists(terms), jnp.where(last >= 1.0 - 1e-12, 0.0, frequency), jnp.nan)
 
 
-def _falls(edge: _Edge, e: Array) -> Array:
-    # A positive number times the slope by which kappa of an edge falls with e.
+def _decrease(edge: _Edge, e: Array) -> Array:
+    # A positive number times the rate at which kappa of an edge decreases with e.
     (t0, t1), (p0, p1) = edge.tilting, edge.pulling
     return (t0 + e * p0) * p0 + (t1 + e * p1) * p1
 
@@ -186,9 +186,9 @@ def _each(function, hull: SpoolHull, items):
 def of_many(function, hull: SpoolHull, *items):
     """One of the functions above for many ellipses."""
 
-    def part(rows: slice):
+    def part(index: slice):
         return in_batches(
-            partial(_each, function, hull), jax.tree.map(lambda leaf: leaf[rows], items), batch_size=BATCH
+            partial(_each, function, hull), jax.tree.map(lambda array: array[index], items), batch_size=BATCH
         )
 
     count = len(jax.tree.leaves(items)[0])

@@ -16,7 +16,7 @@ from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_norm
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
-# Spools count as in one plane within this part of the size of the robot.
+# Spools count as in one plane within this part of the radius of the robot.
 IN_PLANE = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Leg of ellipses: poses on ellipses and at rest, joined by ways from one to another and by turns."""
+"""Leg of ellipses: poses on ellipses and at rest, joined by transfers from one to another and by turns."""
 
 import dataclasses
 import itertools
@@ -20,7 +20,14 @@ from cspr_jax.families.ellipses.hull import SpoolHull, formula_hull
 from cspr_jax.families.ellipses.motion import EllipseMotion, turning
 from cspr_jax.families.ellipses.releases import Release, ReleaseRequirement, chosen_release
 from cspr_jax.families.ellipses.rotation_frequencies import rotation_frequencies
-from cspr_jax.families.ellipses.transfers import Turning, Way, between, least_way, rotation_between, step_of
+from cspr_jax.families.ellipses.transfers import (
+    Transfer,
+    Turning,
+    between,
+    rotation_between,
+    smallest_transfer,
+    step_of,
+)
 from cspr_jax.launch.flight import parabola_of
 from cspr_jax.launch.landings import Throw
 from cspr_jax.launch.launch_result import LaunchResult, launch_result
@@ -89,13 +96,13 @@ class Ellipses(Leg):
             trajectory=waypoints.plan_file,
         )
         turnings = self._turnings(problem, z0, scene)
-        ways: list[Way] = []
-        place = turnings[0]
+        transfers: list[Transfer] = []
+        current = turnings[0]
         for i, last in enumerate(turnings[1:], start=1):
-            ways.append(self._way(problem, i, place, last, scene))
-            turns = self._turns(i, place, last)
-            place = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
-        return self._answers(problem, turnings, ways, scene), [way.motion for way in ways]
+            transfers.append(self._transfer(problem, i, current, last, scene))
+            turns = self._turns(i, current, last)
+            current = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
+        return self._answers(problem, turnings, transfers, scene), [transfer.motion for transfer in transfers]
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LaunchResult | None:
         """Release at the end of a segment, and flight of the object; see `Leg.result`."""
@@ -103,22 +110,22 @@ class Ellipses(Leg):
         if table is None or self._of_launch is None:
             return None
         at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
-        way = cast(EllipseMotion, joined.motions[at])
-        # Late objects are released behind the segment: on the next one, else on the same ellipse.
+        motion = cast(EllipseMotion, joined.motions[at])
+        # Late objects are released after the segment: on the next one, else on the same ellipse.
         after = (
             joined.motions[at + 1]
             if at + 1 < len(self)
-            else turning(way.last, way.frequencies[1], as_float64(0.0), 1.0)
+            else turning(motion.last, motion.frequencies[1], as_float64(0.0), 1.0)
         )
         return launch_result(
             table,
             frame,
             problem.robot,
-            Throw((way, after), np.asarray(way.time), np.asarray(frame.inward(table.target))),
+            Throw((motion, after), np.asarray(motion.time), np.asarray(frame.inward(table.target))),
             time=start + float(answers.duration[: at + 1].sum()),
             flight_time=float(answers.flight_time[at]),
             tension_min=float(tension_min[at]),
-            half_axes=frame.rotated(np.stack([way.last.cosine, way.last.sine])),
+            half_axes=frame.rotated(np.stack([motion.last.cosine, motion.last.sine])),
         )
 
     def _release(self, problem: Problem, before: Turning, scene: Scene) -> Release:
@@ -152,7 +159,7 @@ class Ellipses(Leg):
             raise ConfigError(waypoints.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
             raise ConfigError(waypoints.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
-        # Families before and behind need the place of the pose that they share.
+        # Families before and after need the position of the pose that they share.
         is_shared = (i == 0 and waypoints.first > 0) or (
             i == len(waypoints) and waypoints.last < len(waypoints.plan_file.pose) - 1
         )
@@ -253,7 +260,7 @@ class Ellipses(Leg):
             return pose.turns
         return 0.0 if last.rests or step_of(first, last) else 1.0
 
-    def _way(self, problem: Problem, i: int, first: Turning, last: Turning, scene: Scene) -> Way:
+    def _transfer(self, problem: Problem, i: int, first: Turning, last: Turning, scene: Scene) -> Transfer:
         waypoints, turns, step = self.waypoints, self._turns(i, first, last), step_of(first, last)
         arcs = int(waypoints.arcs[i - 1])
         if arcs % max(step, 1) or (arcs and not step):
@@ -266,21 +273,25 @@ class Ellipses(Leg):
         if not step and not turns and not between(first, last):
             key = "turns" if waypoints.plan_file.ellipse is not None else f"{waypoints.name(i)}.turns"
             raise ConfigError(waypoints.path, f"{key} = 0: must be above 0 on one and the same ellipse")
-        return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=waypoints.max_arcs)
+        return smallest_transfer(problem, first, last, turns, scene, arcs=arcs, max_arcs=waypoints.max_arcs)
 
-    def _answers(self, problem: Problem, turnings: list[Turning], ways: list[Way], scene: Scene) -> EllipseAnswers:
+    def _answers(
+        self, problem: Problem, turnings: list[Turning], transfers: list[Transfer], scene: Scene
+    ) -> EllipseAnswers:
         hull = formula_hull(problem.robot)
-        motions = [way.motion for way in ways]
-        plain = answers_of([way.proof for way in ways], np.array([float(motion.duration()) for motion in motions]))
+        motions = [transfer.motion for transfer in transfers]
+        plain = answers_of(
+            [transfer.proof for transfer in transfers], np.array([float(motion.duration()) for motion in motions])
+        )
         judge_all_robots(problem, plain, motions, scene)
-        arcs, verdict = np.array([way.arcs for way in ways]), np.array(plain.verdict, FLAGS)
+        arcs, verdict = np.array([transfer.arcs for transfer in transfers]), np.array(plain.verdict, FLAGS)
         free = (self.waypoints.arcs == 0) & (arcs > 0)
         broken = (verdict != 0) & (verdict != Verdict.UNDECIDED.value)
         verdict[free & broken] |= Verdict.NO_ARCS.value
-        doubtful = np.array([way.fewer_undecided for way in ways]) & (verdict == 0)
+        doubtful = np.array([transfer.fewer_undecided for transfer in transfers]) & (verdict == 0)
         is_feasible = verdict == 0
         verdict[doubtful] |= Verdict.FEWER_ARCS_UNDECIDED.value
-        details = np.empty(len(ways), object)
+        details = np.empty(len(transfers), object)
         details[:] = [
             _details(problem, hull, first if last.rests else last, self.waypoints.frame)
             for first, last in itertools.pairwise(turnings)
@@ -300,8 +311,8 @@ def _details(problem: Problem, hull: SpoolHull | None, turning: Turning, frame: 
         details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_modes": modes}
     if hull is None:
         return details
-    row = Ellipse(*(np.asarray(leaf)[None] for leaf in turning.ellipse))
-    low, high = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, row))
-    margins = harmonics.of_many(harmonics.least_margin, hull, row, np.array([turning.frequency]))
+    batch = Ellipse(*(np.asarray(array)[None] for array in turning.ellipse))
+    low, high = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, batch))
+    margins = harmonics.of_many(harmonics.least_margin, hull, batch, np.array([turning.frequency]))
     intervals = [] if math.isnan(low) else [[low, high]]
     return details | {"frequency_intervals": intervals, "pseudotension_margin": float(margins[0])}

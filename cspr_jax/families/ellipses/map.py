@@ -1,4 +1,4 @@
-"""Maps of ellipses over centres, sizes, inclinations and frequencies."""
+"""Maps of ellipses over centres, radii, inclinations and frequencies."""
 
 import math
 
@@ -16,7 +16,7 @@ from cspr_jax.robots.model.point_mass import PLANAR
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
-MOST_CABLES = 250
+MAX_CABLES = 250
 # By how much ends of intervals may be off, in parts of themselves.
 CHECK_ERROR = 1e-9
 
@@ -27,19 +27,19 @@ class EllipseMap(PointMassMap):
     any_cables = True
     proves = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse ellipses without a size, or with two, and frequencies for which there is no rule."""
-        super().__init__(robot_file, keys, file)
-        robot, axes = self._problem.robot, keys.axes
-        self._ellipse, self._is_planar = keys.ellipse or SweepEllipse(), robot.dof == PLANAR
-        if robot.n_cables > MOST_CABLES:
-            place, key = robot_file.placed("base_points", file)
-            raise ConfigError(place, f"{key}: must be at most {MOST_CABLES} in this map")
-        sizes = [name for name in ("half_axes", "radius") if getattr(self._ellipse, name) is not None]
-        if axes.circle_radius is not None and (sizes or axes.scale is not None):
-            other = f"ellipse.{sizes[0]}" if sizes else "axes.scale"
+        super().__init__(robot_file, sweep_file, file)
+        robot, axes = self._problem.robot, sweep_file.axes
+        self._ellipse, self._is_planar = sweep_file.ellipse or SweepEllipse(), robot.dof == PLANAR
+        if robot.n_cables > MAX_CABLES:
+            at, key = robot_file.placed("base_points", file)
+            raise ConfigError(at, f"{key}: must be at most {MAX_CABLES} in this map")
+        radii = [name for name in ("half_axes", "radius") if getattr(self._ellipse, name) is not None]
+        if axes.circle_radius is not None and (radii or axes.scale is not None):
+            other = f"ellipse.{radii[0]}" if radii else "axes.scale"
             raise ConfigError(file, f"{other}: must be absent beside axes.circle_radius")
-        if axes.circle_radius is None and not sizes:
+        if axes.circle_radius is None and not radii:
             raise ConfigError(file, "ellipse.radius is missing: must be there, or half_axes, or axes.circle_radius")
         self._check_plane()
         rule = self._ellipse.frequency

@@ -1,11 +1,12 @@
-"""Motion on harmonic ellipses: turns on one, and the way from one to another, from rest or to rest.
+"""Motion on harmonic ellipses: turns on one, and transfers from one to another, from rest or to rest.
 
 Along a law s from 0 to 1 centre, axes and frequency go from those of the first ellipse to those of the last:
 
     x = C + a cos(theta) + b sin(theta),    C = C0 + s (C1 - C0), a and b likewise,    theta' = w0 + s (w1 - w0).
 
-The law starts and ends without slope and curvature, so that position, velocity and acceleration at both ends are those
-of the ellipses. Rest is an ellipse whose axes are zero; a law that is constant, turns on one ellipse.
+The first two derivatives of the law are zero at its start and its end, so that position, velocity and acceleration at
+both ends are those of the ellipses. Rest is an ellipse whose axes are zero; a law that is constant, turns on one
+ellipse.
 """
 
 from __future__ import annotations
@@ -81,11 +82,11 @@ class EllipseMotion:
         rates = (start + change * s[0], change * s[1] / self.time)
         in_time = (s[0], s[1] / self.time, s[2] / self.time**2)
         turns = (jnp.cos(angle), jnp.sin(angle))
-        place = _kinematics(self.first, self.last, in_time, turns, rates)
+        position = _kinematics(self.first, self.last, in_time, turns, rates)
         if self.rotation is None:
-            return State(*place)
+            return State(*position)
         return State(
-            *place, *rotation_state(self.rotation, in_time, _oscillation(self.rotation, in_time, turns, rates))
+            *position, *rotation_state(self.rotation, in_time, _oscillation(self.rotation, in_time, turns, rates))
         )
 
     def breaks(self) -> Array:
@@ -110,16 +111,16 @@ def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tu
     outward, forward = a * cosine + b * sine, b * cosine - a * sine
     growing = [s[1] * span for span in spans]
     bending = [s[2] * span for span in spans]
-    place = s[0] * spans[0] + first.centre + outward
-    pace = growing[0] + growing[1] * cosine + growing[2] * sine + forward * rates[0]
+    position = s[0] * spans[0] + first.centre + outward
+    velocity = growing[0] + growing[1] * cosine + growing[2] * sine + forward * rates[0]
     swept = growing[2] * cosine - growing[1] * sine
     second_derivative = bending[0] + bending[1] * cosine + bending[2] * sine
-    pull = second_derivative + swept * (rates[0] * 2.0) + forward * rates[1] - outward * (rates[0] * rates[0])
-    return place, pace, pull
+    acceleration = second_derivative + swept * (rates[0] * 2.0) + forward * rates[1] - outward * (rates[0] * rates[0])
+    return position, velocity, acceleration
 
 
 def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:
-    # The angle of the oscillation runs along a line as places run along an ellipse.
+    # The angle of the oscillation moves along a line as positions do along an ellipse.
     first, last = (Ellipse(jnp.zeros_like(parts[0]), parts[0], parts[1]) for parts in (rotation.first, rotation.last))
     return _kinematics(first, last, s, turns, rates)
 
@@ -137,11 +138,11 @@ def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> S
         sine, cosine = sincospi(angle)
         rates = (s * change + start, s1 * (change / time))
         in_time, turns = (s, s1 * (1.0 / time), s2 * (1.0 / time**2)), (cosine, sine)
-        place = _kinematics(motion.first, motion.last, in_time, turns, rates)
+        position = _kinematics(motion.first, motion.last, in_time, turns, rates)
         if motion.rotation is None:
-            return StateBounds(*place)
+            return StateBounds(*position)
         oscillation = _oscillation(motion.rotation, in_time, turns, rates)
-        return StateBounds(*place, *rotation_bounds(motion.rotation, in_time, oscillation))
+        return StateBounds(*position, *rotation_bounds(motion.rotation, in_time, oscillation))
 
     return jax.vmap(one)(blocks)
 
@@ -153,7 +154,7 @@ def turning(ellipse: Ellipse, frequency: Float[Array, ""], phase: Float[Array, "
 
 
 def with_turns(amplitude: Amplitude, fraction: float) -> Amplitude:
-    """Law of a way that takes a share of the time, and of turns for the rest."""
+    """Law of a transfer that takes a fraction of the time, and of turns for the rest."""
     if fraction == 0.0:
         return from_pieces("1", (), (0.0,), ((1.0,),))
     powers = fraction ** -np.arange(amplitude.coefficients.shape[1])
@@ -168,8 +169,8 @@ def integral(law: Amplitude) -> Amplitude:
     """Integral of a law from the start on."""
     origins, knots = np.asarray(law.origins), np.asarray(law.knots)
     pieces, value = [], 0.0
-    for row, origin, first, last in zip(law.coefficients, origins, [0.0, *knots], [*knots, 1.0], strict=True):
-        curve = np.polynomial.Polynomial(np.asarray(row)).integ(lbnd=first - origin)
+    for coefficients, origin, first, last in zip(law.coefficients, origins, [0.0, *knots], [*knots, 1.0], strict=True):
+        curve = np.polynomial.Polynomial(np.asarray(coefficients)).integ(lbnd=first - origin)
         pieces.append((curve + value).coef.tolist())
         value += float(curve(last - origin))
     return from_pieces(law.name, knots.tolist(), origins.tolist(), pieces)

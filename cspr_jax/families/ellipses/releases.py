@@ -1,6 +1,6 @@
-"""Releases from ellipses: the ellipse that passes a place with a velocity, and the choice of what is left open.
+"""Releases from ellipses: the ellipse that passes a point with a velocity, and the choice of what is left open.
 
-An object that is to leave at the place p with the velocity v leaves the ellipse
+An object that is to leave at the point p with the velocity v leaves the ellipse
 
     x = C + (p - C) cos(angle) + (v / w) sin(angle)
 
@@ -35,14 +35,16 @@ from cspr_jax.verification.proved_answers import proof_of, sampled_proof
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Times of flight of a first look, over the time of a fall from the plane of the spools to the centre, and their number.
-SHORTEST, LONGEST, LOOKS = 0.01, 100.0, 257
-# Times of flight that are looked at for each number of arcs, halvings that narrow an end, and the shares of the way to
-# the middle of the feasible times by which an end is kept off.
-FEW_LOOKS, HALVINGS, INSIDE = 33, 40, (1e-3, 1e-2, 1e-1)
-# Samples of a way.
-SAMPLES = 256
-# Frequencies are looked for between these parts of the natural one.
+# Times of flight of a grid, over the time of a fall from the plane of the spools to the centre, and their number.
+SHORTEST = 0.01
+LONGEST = 100.0
+GRID = 257
+COARSE_GRID = 33  # times of flight for each number of arcs
+HALVINGS = 40  # that narrow an end
+# Fractions of the distance to the middle of the feasible times by which an end is kept off.
+INSIDE = (1e-3, 1e-2, 1e-1)
+SAMPLES = 256  # of a transfer
+# Frequencies are sought between these parts of the natural one.
 WIDEST = 100.0
 
 
@@ -75,7 +77,7 @@ class ReleaseRequirement(NamedTuple):
     turns: float
 
     def states(self, times: Any) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-        """Place and velocity of the release."""
+        """Position and velocity of the release."""
         parabola, gravity = self.parabola, self.problem.robot.gravity
 
         def one(time: Any) -> tuple[Any, Any]:
@@ -83,18 +85,20 @@ class ReleaseRequirement(NamedTuple):
                 return flown(parabola.target, parabola.velocity, gravity, -time)
             return jnp.asarray(parabola.point), aimed(parabola.point, parabola.target, gravity, time)
 
-        place, velocity = jax.vmap(one)(np.asarray(times, float))
-        return np.asarray(place), np.asarray(velocity)
+        position, velocity = jax.vmap(one)(np.asarray(times, float))
+        return np.asarray(position), np.asarray(velocity)
 
     def ellipses(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Ellipse:
-        """Ellipses that pass the place of the release with its velocity."""
-        place, velocity = self.states(times)
-        return Ellipse(np.broadcast_to(self.centre, place.shape), place - self.centre, velocity / frequencies[:, None])
+        """Ellipses that pass the point of the release with its velocity."""
+        position, velocity = self.states(times)
+        return Ellipse(
+            np.broadcast_to(self.centre, position.shape), position - self.centre, velocity / frequencies[:, None]
+        )
 
     def slacks(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         """Slacks of the ellipses, positive where they are feasible: of samples, and of formulas where these hold."""
         ellipses = self.ellipses(times, frequencies)
-        each = Ellipse(*(leaf[:, None] for leaf in ellipses))
+        each = Ellipse(*(array[:, None] for array in ellipses))
         return np.fmin(self.margins(ellipses, frequencies), sampled_slacks(self.problem, each, frequencies, self.scene))
 
     def margins(self, ellipses: Ellipse, frequencies: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
@@ -106,7 +110,7 @@ class ReleaseRequirement(NamedTuple):
 
     def release(self, time: float, frequency: float) -> Release:
         """Release after a whole number of turns."""
-        ellipse = Ellipse(*(leaf[0] for leaf in self.ellipses([time], np.array([frequency]))))
+        ellipse = Ellipse(*(array[0] for array in self.ellipses([time], np.array([frequency]))))
         return Release(ellipse, frequency, -2.0 * math.pi * self.turns, flight_time=time)
 
 
@@ -142,8 +146,8 @@ class _Times:
 
     def __init__(self, requirement: ReleaseRequirement, frequency: float, natural: float) -> None:
         self._requirement, self._frequency = requirement, frequency
-        self._looks = np.geomspace(SHORTEST / natural, LONGEST / natural, LOOKS)
-        self._slacks = self._slack(self._looks)
+        self._grid = np.geomspace(SHORTEST / natural, LONGEST / natural, GRID)
+        self._slacks = self._slack(self._grid)
 
     def of_least_energy(self) -> float:
         # The energy is convex in the time: if its minimum is infeasible, the best time is an end of feasible times.
@@ -152,15 +156,15 @@ class _Times:
             return lowest
         feasible = np.flatnonzero(slacks > 0.0)
         if not len(feasible):
-            return float(self._looks[slacks.argmax()])
-        energy = (self._requirement.states(self._looks)[1] ** 2).sum(1)
+            return float(self._grid[slacks.argmax()])
+        energy = (self._requirement.states(self._grid)[1] ** 2).sum(1)
         at = int(feasible[energy[feasible].argmin()])
-        inside, looks = float(self._looks[at]), self._looks
-        # Nothing is feasible that was looked at between this time and the minimum.
+        inside, grid = float(self._grid[at]), self._grid
+        # No time of the grid is feasible between this time and the minimum.
         if inside < lowest:
-            outside = min(lowest, looks[looks > inside].min(initial=np.inf))
+            outside = min(lowest, grid[grid > inside].min(initial=np.inf))
         else:
-            outside = max(lowest, looks[looks < inside].max(initial=0.0))
+            outside = max(lowest, grid[grid < inside].max(initial=0.0))
         end = _narrowed(self._slack, inside, outside)
         return end + INSIDE[0] * (self._middle(at) - end)
 
@@ -169,39 +173,39 @@ class _Times:
         feasible = np.flatnonzero(self._slacks > 0.0)
         best, landing = None, np.inf
         if not len(feasible):
-            return float(self._looks[self._slacks.argmax()])
-        looks = self._looks[feasible[np.unique(np.linspace(0, len(feasible) - 1, FEW_LOOKS).astype(int))]]
+            return float(self._grid[self._slacks.argmax()])
+        grid = self._grid[feasible[np.unique(np.linspace(0, len(feasible) - 1, COARSE_GRID).astype(int))]]
         for number in arcs:
-            duration = float(self._way(before, float(looks[0]), number).duration())
-            time = self._earliest(before, looks[looks + duration < landing], number)
+            duration = float(self._transfer(before, float(grid[0]), number).duration())
+            time = self._earliest(before, grid[grid + duration < landing], number)
             if time is not None:
                 best, landing = time, time + duration
         return self.of_least_energy() if best is None else best
 
-    def _earliest(self, before: Turning, looks: np.ndarray, number: int) -> float | None:
-        # The shortest time of flight whose way, with this number of arcs, is proved.
+    def _earliest(self, before: Turning, grid: np.ndarray, number: int) -> float | None:
+        # The shortest time of flight whose transfer, with this number of arcs, is proved.
         def slack(times: np.ndarray) -> np.ndarray:
             problem, scene = self._requirement.problem, self._requirement.scene
-            proofs = [sampled_proof(problem, self._way(before, t, number), scene, SAMPLES) for t in times.tolist()]
-            ways = np.array([(proof.proof.high / proof.scales).min() for proof in proofs])
-            return np.minimum(ways, self._slack(times))
+            proofs = [sampled_proof(problem, self._transfer(before, t, number), scene, SAMPLES) for t in times.tolist()]
+            slacks = np.array([(proof.proof.high / proof.scales).min() for proof in proofs])
+            return np.minimum(slacks, self._slack(times))
 
-        first = next((i for i, time in enumerate(looks) if slack(looks[i : i + 1])[0] > 0.0), None)
+        first = next((i for i, time in enumerate(grid) if slack(grid[i : i + 1])[0] > 0.0), None)
         if first is None:
             return None
-        end = float(looks[first])
+        end = float(grid[first])
         if first:
-            end = _narrowed(slack, end, float(looks[first - 1]))
-        inside = float(looks[min(first + 1, len(looks) - 1)])
+            end = _narrowed(slack, end, float(grid[first - 1]))
+        inside = float(grid[min(first + 1, len(grid) - 1)])
         for fraction in INSIDE:
             time = end + fraction * (inside - end)
             if not proof_of(
-                self._requirement.problem, self._way(before, time, number), self._requirement.scene
+                self._requirement.problem, self._transfer(before, time, number), self._requirement.scene
             ).verdict:
                 return time
         return None
 
-    def _way(self, before: Turning, time: float, number: int) -> Any:
+    def _transfer(self, before: Turning, time: float, number: int) -> Any:
         release = self._requirement.release(time, self._frequency)
         problem, turns = self._requirement.problem, self._requirement.turns
         return motion_between(problem.amplitude, before, release, number, turns)
@@ -217,13 +221,13 @@ class _Times:
             time = math.sqrt(2.0 * float(np.linalg.norm(parabola.target - parabola.point)) / gravity)
         else:
             time = float(parabola.velocity[2]) / gravity
-        return max(time, float(self._looks[0]))
+        return max(time, float(self._grid[0]))
 
     def _middle(self, at: int) -> float:
         # The time of the largest slack among the feasible ones around a feasible one.
         is_out = np.flatnonzero(self._slacks <= 0.0)
-        low, high = is_out[is_out < at].max(initial=-1) + 1, is_out[is_out > at].min(initial=LOOKS)
-        return float(self._looks[low + self._slacks[low:high].argmax()])
+        low, high = is_out[is_out < at].max(initial=-1) + 1, is_out[is_out > at].min(initial=GRID)
+        return float(self._grid[low + self._slacks[low:high].argmax()])
 
 
 def _narrowed(slack: Callable, inside: float, outside: float) -> float:

@@ -2,8 +2,8 @@
 
     R = Q(axis, psi) S(s turn) R0,    psi = p cos(theta) + q sin(theta),
 
-with the law s of the way and the angle theta of the ellipse; p and q go from those of the first ellipse to those of the
-last one, as its half-axes do.
+with the law s of the transfer and the angle theta of the ellipse; p and q go from those of the first ellipse to those
+of the last one, as its half-axes do.
 """
 
 from __future__ import annotations
@@ -58,36 +58,38 @@ def _quaternion(axis: Array, angle: Array) -> Array:
 
 def _direction(vector: Array) -> tuple[Array, Array]:
     # Unit vector, any of a vector without a length, and the length.
-    size = length(vector)
-    return jnp.where(size > 0.0, vector / jnp.where(size > 0.0, size, 1.0), jnp.eye(3)[0]), size
+    norm = length(vector)
+    return jnp.where(norm > 0.0, vector / jnp.where(norm > 0.0, norm, 1.0), jnp.eye(3)[0]), norm
 
 
 def rotation_state(
     rotation: Rotation, s: tuple, psi: tuple
 ) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, "3"], Float[Array, "4"]]:
-    """Rotation at one instant."""
-    way, angle = _direction(rotation.turn)
+    """Rotation at one time."""
+    direction, angle = _direction(rotation.turn)
     swing = _quaternion(rotation.axis, psi[0])
-    quaternion = rotations.product(swing, rotations.product(_quaternion(way, s[0] * angle), rotation.start))
+    quaternion = rotations.product(swing, rotations.product(_quaternion(direction, s[0] * angle), rotation.start))
     outer = rotations.matrix(swing)
     spin, second_derivative = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
-    beat = psi[1] * rotation.axis
-    rate = psi[2] * rotation.axis + second_derivative + jnp.cross(beat, spin)
-    return rotations.matrix(quaternion), beat + spin, rate, quaternion
+    oscillating = psi[1] * rotation.axis
+    rate = psi[2] * rotation.axis + second_derivative + jnp.cross(oscillating, spin)
+    return rotations.matrix(quaternion), oscillating + spin, rate, quaternion
 
 
 def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
     """Bounds of the rotation over a block; see `rotation_state`."""
-    way, angle = _direction(rotation.turn)
+    direction, angle = _direction(rotation.turn)
     outer = _about(rotation.axis, psi[0])
-    inner = dot(_rows(_about(way, s[0] * angle)), rotations.matrix(rotation.start).T[None])
-    full = dot(_rows(outer), inner.each(lambda x: x.T[None]))
+    inner = dot(_expanded(_about(direction, s[0] * angle)), rotations.matrix(rotation.start).T[None])
+    full = dot(_expanded(outer), inner.each(lambda x: x.T[None]))
     spin, second_derivative = rotated(outer, s[1] * rotation.turn), rotated(outer, s[2] * rotation.turn)
-    beat = psi[1] * rotation.axis
-    return RotationBounds(full, beat + spin, psi[2] * rotation.axis + second_derivative + cross(beat, spin))
+    oscillating = psi[1] * rotation.axis
+    return RotationBounds(
+        full, oscillating + spin, psi[2] * rotation.axis + second_derivative + cross(oscillating, spin)
+    )
 
 
-def _rows(matrix: AffineBounds) -> AffineBounds:
+def _expanded(matrix: AffineBounds) -> AffineBounds:
     return matrix.each(lambda x: x[:, None])
 
 
@@ -96,6 +98,6 @@ def _about(axis: Array, angle: AffineBounds) -> AffineBounds:
     x, y, z = axis
     zero = jnp.zeros_like(x)
     skew: Any = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
-    sine, cosine = (f.each(lambda leaf: leaf[:, None]) for f in sincospi(angle * (1.0 / math.pi)))
+    sine, cosine = (f.each(lambda array: array[:, None]) for f in sincospi(angle * (1.0 / math.pi)))
     square = jnp.outer(axis, axis) - jnp.eye(3)
     return sine * skew + (1.0 - cosine) * square + jnp.eye(3)

@@ -1,15 +1,15 @@
 """Natural frequencies of rotation of a platform about its rest in a pose.
 
 At rest the cables pull with forces tau_k (c_k - r_k), r_k and c_k from the mass centre to attachment point and spool.
-Where a platform moves by a small u and turns by a small delta while these tau_k, tensions over lengths, stay what they
-are, force and moment about the mass centre change by
+Where a platform moves by a small u and rotates by a small delta while these tau_k, tensions over lengths, stay
+constant, force and moment about the mass centre change by
 
     -(sum tau_k) u + S x delta,    -S x u - sum_k tau_k ((r_k . c_k) delta - r_k (c_k . delta)),    S = sum_k tau_k r_k,
 
 as the force of a pendulum changes with its displacement. With mass and inertia these have six natural modes; at their
 frequencies a small oscillation asks for no change of tau_k to first order. Where S is zero, as in a symmetric reference
 pose, three of them are translations at sqrt(sum tau_k / m) and three are rotations about the mass centre; elsewhere
-those three count as rotations in which the kinetic energy of rotation has the largest share.
+those three count as rotations in which the kinetic energy of rotation is the largest part.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def rotation_frequencies(
         return RotationFrequencies(np.full(3, np.nan), np.full((3, 6), np.nan))
     squares, modes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), inertia)
     # Modes have the kinetic energy 1 / 2 at the speed 1.
-    shares = np.einsum("im,ij,jm->m", modes[3:], inertia[3:, 3:], modes[3:])
-    chosen = np.sort(np.argsort(-shares)[:3])
+    fractions = np.einsum("im,ij,jm->m", modes[3:], inertia[3:, 3:], modes[3:])
+    chosen = np.sort(np.argsort(-fractions)[:3])
     frequencies = np.sqrt(np.where(squares > 0.0, squares, np.nan))[chosen]
     turning = modes[:, chosen] / np.linalg.norm(modes[3:, chosen], axis=0)
     return RotationFrequencies(frequencies, turning.T)

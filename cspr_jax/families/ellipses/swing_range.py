@@ -1,6 +1,6 @@
 """Range of swings: to each landing place the slowest release from an ellipse about a centre, at its natural frequency.
 
-After the time of flight t the object is at the target if the velocity of the release p is (q - p) / t, with q the place
+After the time of flight t the object is at the target if the velocity of the release p is (q - p) / t, with q the point
 above the target from which it would fall there in that time. With depths below the plane of the spools, D that of the
 centre, the ellipse is feasible exactly if the centre lies below the hull of the spools and (`releases`)
 
@@ -30,16 +30,17 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Shortest time of flight, over the longest one, number of times, and how often a grid of `AROUND` times narrows about
-# the best one.
-SHORTEST, LOOKS, AROUND, NARROWED = 0.003, 513, 33, 8
-# Share of its room that an ellipse keeps from the plane of the spools and from the floor.
+SHORTEST = 0.003  # time of flight, over the longest one
+GRID = 513  # times of flight
+AROUND = 33  # times of each narrower grid about the best one
+NARROWED = 8  # how often
+# Fraction of its slack that an ellipse keeps from the plane of the spools and from the floor.
 KEPT = 1e-6
 # Bound of the rounding of margins.
 MARGIN_ERROR = 1e-13
-# Halvings that find a nearest point, and cells at a time.
-HALVINGS, TOGETHER = 80, 256
-# Slopes of the plane of the spools that count as none.
+HALVINGS = 80  # that find a nearest point
+TOGETHER = 256  # cells at a time
+# Gradients of the plane of the spools that count as none.
 LEVEL = 1e-9
 
 
@@ -47,7 +48,7 @@ LEVEL = 1e-9
 class SwingRange(Releases):
     """Slowest releases from ellipses to n landing places; see `Releases`.
 
-    Where there is none, the verdict says what stands in the way at all times of flight that were looked at. Margins are
+    Where there is none, the verdict says what stands in the way at all times of flight that were tried. Margins are
     of taut cables and depth, and over the depth of the centre of the floor.
 
     Fields:
@@ -72,17 +73,17 @@ class _Cells(NamedTuple):
 
 
 class _Space(NamedTuple):
-    # Normal of the plane of the spools, gravity, places of release, depth of the floor.
+    # Normal of the plane of the spools, gravity, box of releases, depth of the floor.
     normal: np.ndarray
     gravity: float
     box: ReleaseBox
     floor: float
 
 
-class _Looks(NamedTuple):
-    # At (n, k) times of flight: the slowest release, (n, k, 3), its speed, inf without one, and the largest rooms that
+class _Samples(NamedTuple):
+    # At (n, k) times of flight: the slowest release, (n, k, 3), its speed, inf without one, and the largest slacks that
     # ellipses leave below the plane of the spools and above the floor, over the depth of the centre.
-    place: np.ndarray
+    position: np.ndarray
     speed: np.ndarray
     below: np.ndarray
     above: np.ndarray
@@ -104,43 +105,43 @@ def swing_range(
     cells = cells._replace(frequency=np.sqrt(space.gravity / cells.depth)[:, None])
     parts = [slice(i, i + TOGETHER) for i in range(0, len(centres), TOGETHER)]
     columns = [_slowest(space, _Cells(*(column[part] for column in cells))) for part in parts]
-    time, place, speed, below, above = (np.concatenate(column) for column in zip(*columns, strict=True))
-    velocity = (_above(space, cells, time[:, None])[:, 0] - place) / time[:, None]
-    ellipse, rates = Ellipse(centres, place - centres, velocity / cells.frequency), cells.frequency[:, 0]
+    time, position, speed, below, above = (np.concatenate(column) for column in zip(*columns, strict=True))
+    velocity = (_above(space, cells, time[:, None])[:, 0] - position) / time[:, None]
+    ellipse, rates = Ellipse(centres, position - centres, velocity / cells.frequency), cells.frequency[:, 0]
     nothing = np.zeros_like(centres)
-    still = harmonics.of_many(harmonics.least_margin, hull, Ellipse(centres, nothing, nothing), rates)
+    static = harmonics.of_many(harmonics.least_margin, hull, Ellipse(centres, nothing, nothing), rates)
     margin = harmonics.of_many(harmonics.least_margin, hull, ellipse, rates)
     is_found = np.isfinite(speed) & (margin > MARGIN_ERROR)
     lost = np.where(below > 0.0, 0, Verdict.ABOVE_SPOOLS.value) | np.where(above > 0.0, 0, Verdict.BELOW_FLOOR.value)
-    lost = np.where(still > 0.0, np.where(lost == 0, Verdict.UNDECIDED.value, lost), Verdict.SLACK_CABLE.value)
-    lost = np.where(np.abs(still) > MARGIN_ERROR, lost, Verdict.UNDECIDED.value)
+    lost = np.where(static > 0.0, np.where(lost == 0, Verdict.UNDECIDED.value, lost), Verdict.SLACK_CABLE.value)
+    lost = np.where(np.abs(static) > MARGIN_ERROR, lost, Verdict.UNDECIDED.value)
     lost = np.where(depth > 0.0, lost, Verdict.ABOVE_SPOOLS.value)
     # The larger half-axis, from the eigenvalues of a a + b b.
     squares = [np.sum(one * other, axis=1) for one, other in ((ellipse[1],) * 2, (ellipse[2],) * 2, ellipse[1:])]
-    size = np.sqrt(0.5 * (squares[0] + squares[1]) + np.hypot(0.5 * (squares[0] - squares[1]), squares[2]))
+    amplitude = np.sqrt(0.5 * (squares[0] + squares[1]) + np.hypot(0.5 * (squares[0] - squares[1]), squares[2]))
 
     def shown(values: np.ndarray) -> np.ndarray:
         return np.where(is_found, values, np.nan)
 
     return SwingRange(
         np.where(is_found, 0, lost).astype(FLAGS),
-        np.where(still > 0.0, np.minimum(np.minimum(still, 1.0) * below, above), np.minimum(still, -KEPT)),
-        *(shown(x) for x in (speed, time, *place.T, size)),
+        np.where(static > 0.0, np.minimum(np.minimum(static, 1.0) * below, above), np.minimum(static, -KEPT)),
+        *(shown(x) for x in (speed, time, *position.T, amplitude)),
     )
 
 
-def _depth(places: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    # Below the plane of the spools, (...) m; a product of matrices would round by the number of places.
-    return places[..., 0] * normal[0] + places[..., 1] * normal[1] + places[..., 2] * normal[2]
+def _depth(positions: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    # Below the plane of the spools, (...) m; a product of matrices would round by the number of points.
+    return positions[..., 0] * normal[0] + positions[..., 1] * normal[1] + positions[..., 2] * normal[2]
 
 
 def _above(space: _Space, cells: _Cells, times: np.ndarray) -> np.ndarray:
-    # Places from which the object would fall to the target, (n, k, 3).
-    fall = 0.5 * space.gravity * times[..., None] ** 2
-    return cells.target[:, None] - fall * np.array([0.0, 0.0, 1.0])
+    # Points from which the object would fall to the target, (n, k, 3).
+    drop = 0.5 * space.gravity * times[..., None] ** 2
+    return cells.target[:, None] - drop * np.array([0.0, 0.0, 1.0])
 
 
-def _looks(space: _Space, cells: _Cells, times: np.ndarray) -> _Looks:
+def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     normal, (low, high) = space.normal, space.box
     fallen, fraction = _above(space, cells, times), 1.0 / (cells.frequency * times) ** 2
     # Depths that the box has, and those that ellipses leave.
@@ -151,47 +152,47 @@ def _looks(space: _Space, cells: _Cells, times: np.ndarray) -> _Looks:
     )
     first, last = (np.broadcast_to(side, fallen.shape).copy() for side in (low, high))
     first[..., 2], last[..., 2] = np.maximum(low[2], heights.low), np.minimum(high[2], heights.high)
-    place = _nearest(fallen, first, last, normal, depths)
-    depth = _depth(place, normal)
+    position = _nearest(fallen, first, last, normal, depths)
+    depth = _depth(position, normal)
     rounding = KEPT * 1e-3 * cells.depth[:, None]
     is_in = (depth > depths.low - rounding) & (depth < depths.high + rounding) & (first[..., 2] <= last[..., 2])
-    speed = np.sqrt(((fallen - place) ** 2).sum(-1)) / times
-    above = np.where(np.isinf(space.floor), np.inf, heights.room / cells.depth[:, None])
-    return _Looks(place, np.where(is_in, speed, np.inf), depths.room / cells.depth[:, None], above)
+    speed = np.sqrt(((fallen - position) ** 2).sum(-1)) / times
+    above = np.where(np.isinf(space.floor), np.inf, heights.slack / cells.depth[:, None])
+    return _Samples(position, np.where(is_in, speed, np.inf), depths.slack / cells.depth[:, None], above)
 
 
 class _Interval(NamedTuple):
-    # Ends of a coordinate of the release, (n, k) m, NaN where there is none; and the largest room in the box, m.
+    # Ends of a coordinate of the release, (n, k) m, NaN where there is none; and the largest slack in the box, m.
     low: np.ndarray
     high: np.ndarray
-    room: np.ndarray
+    slack: np.ndarray
 
 
-def _interval(centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, reach: np.ndarray, box) -> _Interval:
-    # The p for which (p - centre)^2 + share (fallen - p)^2 stays below the square of the reach.
+def _interval(centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, radius: np.ndarray, box) -> _Interval:
+    # The p for which (p - centre)^2 + fraction (fallen - p)^2 stays below the square of the radius.
     middle = (centre[:, None] + fraction * fallen) / (1.0 + fraction)
-    away, inner = fallen - centre[:, None], reach[:, None] * (1.0 - KEPT)
+    away, inner = fallen - centre[:, None], radius[:, None] * (1.0 - KEPT)
     square = inner**2 / (1.0 + fraction) - fraction * away**2 / (1.0 + fraction) ** 2
     half = np.where(inner > 0.0, np.sqrt(np.where(square >= 0.0, square, np.nan)), np.nan)
     best = np.clip(middle, *box)
     swing = np.sqrt((best - centre[:, None]) ** 2 + fraction * (fallen - best) ** 2)
-    return _Interval(middle - half, middle + half, reach[:, None] - swing)
+    return _Interval(middle - half, middle + half, radius[:, None] - swing)
 
 
 def _nearest(
-    places: np.ndarray, low: np.ndarray, high: np.ndarray, normal: np.ndarray, depths: _Interval
+    positions: np.ndarray, low: np.ndarray, high: np.ndarray, normal: np.ndarray, depths: _Interval
 ) -> np.ndarray:
-    # The points nearest to places in boxes whose depth lies in an interval: a shift along the normal, cut by the box.
-    nearest = np.minimum(np.maximum(places, low), high)
+    # The points nearest to others in boxes whose depth lies in an interval: a shift along the normal, cut by the box.
+    nearest = np.minimum(np.maximum(positions, low), high)
     depth = _depth(nearest, normal)
     goal = np.ravel(np.clip(depth, depths.low, depths.high))
     moved = np.flatnonzero((goal != np.ravel(depth)) & np.isfinite(goal))
-    start, first, last = (x.reshape(-1, 3)[moved] for x in (places, low, high))
+    start, first, last = (x.reshape(-1, 3)[moved] for x in (positions, low, high))
     goal = goal[moved]
     # A shift that takes each coordinate which it changes beyond the box.
-    slope = np.abs(normal[np.abs(normal) > LEVEL])
+    components = np.abs(normal[np.abs(normal) > LEVEL])
     away = np.maximum(np.abs(first - start), np.abs(last - start))[:, np.abs(normal) > LEVEL]
-    up = (away / slope).max(1, initial=0.0)
+    up = (away / components).max(1, initial=0.0)
     down = -up
     for _ in range(HALVINGS):
         shift = 0.5 * (down + up)
@@ -199,24 +200,24 @@ def _nearest(
         down, up = np.where(is_high, down, shift), np.where(is_high, shift, up)
     flat = nearest.reshape(-1, 3)
     flat[moved] = np.minimum(np.maximum(start + (0.5 * (down + up))[:, None] * normal, first), last)
-    return flat.reshape(places.shape)
+    return flat.reshape(positions.shape)
 
 
 def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
-    # Times of flight, places and speeds of the slowest releases; rooms below the spools and above the floor at the time
-    # at which the smaller of both is the largest.
+    # Times of flight, positions and speeds of the slowest releases; slacks below the spools and above the floor at the
+    # time at which the smaller of both is the largest.
     top = np.minimum(space.box.low * space.normal, space.box.high * space.normal).sum()
     # Longer flights rise above the spools.
     drop = np.maximum((_depth(cells.target, space.normal) - top) / cells.depth, 0.0)
     longest = 1.0 + np.sqrt(1.0 + 2.0 * drop)
-    times = np.geomspace(SHORTEST, 1.0, LOOKS) * longest[:, None] / cells.frequency
-    looks, each = _looks(space, cells, times), np.arange(len(drop))
-    at = np.minimum(looks.below, looks.above).argmax(1)
-    below, above = looks.below[each, at], looks.above[each, at]
+    times = np.geomspace(SHORTEST, 1.0, GRID) * longest[:, None] / cells.frequency
+    samples, each = _sampled(space, cells, times), np.arange(len(drop))
+    at = np.minimum(samples.below, samples.above).argmax(1)
+    below, above = samples.below[each, at], samples.above[each, at]
     for _ in range(NARROWED):
-        best = looks.speed.argmin(1)
+        best = samples.speed.argmin(1)
         first, last = (times[each, np.clip(best + step, 0, times.shape[1] - 1)] for step in (-1, 1))
         times = np.linspace(first, last, AROUND, axis=1)
-        looks = _looks(space, cells, times)
-    best = looks.speed.argmin(1)
-    return times[each, best], looks.place[each, best], looks.speed[each, best], below, above
+        samples = _sampled(space, cells, times)
+    best = samples.speed.argmin(1)
+    return times[each, best], samples.position[each, best], samples.speed[each, best], below, above

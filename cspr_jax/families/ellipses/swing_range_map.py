@@ -1,4 +1,4 @@
-"""Maps of throws from swings: where an object can be thrown from ellipses about a place."""
+"""Maps of throws from swings: where an object can be thrown from ellipses about a point."""
 
 import numpy as np
 
@@ -17,10 +17,10 @@ _OF_SWINGS = ("release_speed", "flight_time", "swing_amplitude", "release_x", "r
 class SwingRangeMap(ReleasesMap):
     """The slowest release from an ellipse to each landing place; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse limits and keys of searches that formulas do not know."""
-        super().__init__(robot_file, keys, file)
-        search = keys.launch or LaunchSearch()
+        super().__init__(robot_file, sweep_file, file)
+        search = sweep_file.launch or LaunchSearch()
         for name in ("max_duration", "population"):
             if name in search.model_fields_set:
                 raise ConfigError(file, f'launch.{name}: must be absent in this map; it is for map = "launch-range"')

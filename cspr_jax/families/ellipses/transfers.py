@@ -1,4 +1,4 @@
-"""Ways between ellipses: the least number of arcs, half turns, whose motion is proved; samples refute most others."""
+"""Transfers between ellipses: the smallest number of arcs, half turns, whose motion is proved."""
 
 import dataclasses
 import math
@@ -27,7 +27,7 @@ class Turning:
 
     Fields:
         ellipse: leaves (3,); a rest has no axes.
-        frequency: rad/s; 0 for a rest, which takes that of the other end of a way.
+        frequency: rad/s; 0 for a rest, which takes that of the other end of a transfer.
         phase: angle, rad.
         quaternion: (4,) mean orientation; None for a point mass.
         axis: (3,) unit vector of the oscillation.
@@ -47,7 +47,7 @@ class Turning:
         return self.frequency == 0.0
 
     def is_same(self, other: "Turning") -> bool:
-        """Tell whether another one is on the same ellipse at the same pace, at any angle."""
+        """Tell whether another one is on the same ellipse at the same frequency, at any angle."""
         return all(np.array_equal(a, b) for a, b in zip(self._parts, other._parts, strict=True))
 
     @property
@@ -56,13 +56,13 @@ class Turning:
         return (*self.ellipse, self.frequency, *turning)
 
 
-class Way(NamedTuple):
-    """Way that was tried.
+class Transfer(NamedTuple):
+    """Transfer that was tried.
 
     Fields:
-        motion: with the turns behind it.
+        motion: with the turns after it.
         proof: of all of it.
-        arcs: number of half turns of the way.
+        arcs: number of half turns of the transfer.
         fewer_undecided: whether a smaller number stayed undecided.
     """
 
@@ -73,7 +73,7 @@ class Way(NamedTuple):
 
 
 def step_of(first: Turning, last: Turning) -> int:
-    """Step between numbers of arcs of a way: 1 where the angle at a rest is free, else 2; 0 where there is no way."""
+    """Step between numbers of arcs of a transfer: 1 where the angle at a rest is free, else 2; 0 without a transfer."""
     if first.is_same(last):
         return 0
     return 1 if first.rests or last.rests else 2
@@ -87,16 +87,16 @@ def between(first: Turning, last: Turning) -> float:
 
 
 def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
-    """Way from one ellipse to another one, and turns on that."""
+    """Motion from one ellipse to another one, and turns on that."""
     step, full = step_of(first, last), 2.0 * math.pi
     start, end = first.frequency or last.frequency, last.frequency or first.frequency
     rest = between(first, last)
     swept = (rest, math.pi * arcs, (rest or full) + math.pi * (arcs - 2))[step]
     phase = last.phase - swept if first.rests else first.phase
     mean = start + (end - start) * float(integral(amplitude).at(1.0))
-    way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
-    law = with_turns(amplitude, way / (way + after) if step else 0.0)
-    frequencies, complete = as_float64([start, end]), as_float64(way + after)
+    transfer_time, turning_time = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
+    law = with_turns(amplitude, transfer_time / (transfer_time + turning_time) if step else 0.0)
+    frequencies, complete = as_float64([start, end]), as_float64(transfer_time + turning_time)
     rotation = rotation_between(first, last)
     return EllipseMotion(
         first.ellipse, last.ellipse, frequencies, as_float64(phase), law, integral(law), complete, rotation
@@ -104,7 +104,7 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
 
 
 def rotation_between(first: Turning, last: Turning) -> Rotation | None:
-    """Rotation of a platform on the way from one ellipse to another."""
+    """Rotation of a platform on the transfer from one ellipse to another."""
     if first.quaternion is None or last.quaternion is None:
         return None
     axis = last.axis if last.oscillation.any() else first.axis
@@ -118,23 +118,23 @@ def rotation_between(first: Turning, last: Turning) -> Rotation | None:
     )
 
 
-def least_way(
+def smallest_transfer(
     problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
-) -> Way:
-    """The way with the least number of arcs that is proved, with the turns behind it."""
+) -> Transfer:
+    """The transfer with the smallest number of arcs that is proved, with the turns after it."""
     step = step_of(first, last)
-    undecided: Way | None = None
-    refuted: list[tuple[float, Way]] = []
+    undecided: Transfer | None = None
+    refuted: list[tuple[float, Transfer]] = []
     for number in [arcs] if arcs or not step else range(step, max_arcs + 1, step):
         motion = motion_between(problem.amplitude, first, last, number, turns)
         proof = sampled_proof(problem, motion, scene, FEW)
         if not proof.broken.any():
             proof = proof_of(problem, motion, scene)
             if not proof.verdict:
-                return Way(motion, proof, number, undecided is not None)
+                return Transfer(motion, proof, number, undecided is not None)
             if not proof.broken.any():
-                undecided = undecided or Way(motion, proof, number)
-        refuted.append((float((proof.proof.high / proof.scales).min()), Way(motion, proof, number)))
+                undecided = undecided or Transfer(motion, proof, number)
+        refuted.append((float((proof.proof.high / proof.scales).min()), Transfer(motion, proof, number)))
     if undecided is not None:
         return undecided
     best = max(refuted, key=lambda each: each[0])[1]

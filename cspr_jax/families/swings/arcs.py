@@ -1,6 +1,6 @@
 """Smallest number of arcs of many segments, with duration, margin and verdict.
 
-A sieve bounds the margin of every number of arcs from above; `families.swings.decide` decides about the survivors.
+A screen bounds the margin of every number of arcs from above; `families.swings.decide` decides about the survivors.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def arcs_and_segments(
         from cspr_jax.families.swings.redundant_arcs import redundant_arcs
 
         return redundant_arcs(problem, parities, infinity, max_arcs=max_arcs, arcs=arcs)
-    upper, at_ends = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
+    upper, at_ends = _screened(problem, parities[0], parities[1], max_arcs, dtype)
     return decided(problem, parities, upper, at_ends, infinity, arcs=arcs)
 
 
@@ -122,8 +122,10 @@ def check_numbers(robot: PointMassRobot, z0: Float[np.ndarray, "n"], max_arcs: i
         raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")
 
 
-def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    # Return the upper bounds (n, max_arcs) of the sieve, and the slacks (n, n_criteria) at the two ends, which are the
+def _screened(
+    problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return the upper bounds (n, max_arcs) of the screen, and the slacks (n, n_criteria) at the two ends, which are the
     # same for all numbers of arcs.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(screen.upper_bounds, max_arcs=max_arcs)

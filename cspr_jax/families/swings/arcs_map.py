@@ -23,11 +23,11 @@ class MinimumArcsMap(PointMassMap):
     proves = True
     any_cables = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""
         if robot_file.is_planar:
             raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
-        super().__init__(robot_file, keys, file)
+        super().__init__(robot_file, sweep_file, file)
         self._scene = self._surroundings(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -22,10 +22,10 @@ from cspr_jax.families.swings.parities import pick, rows_of
 from cspr_jax.families.swings.proof import criteria
 from cspr_jax.families.swings.proof.criteria import BASIC
 from cspr_jax.families.swings.proof.enclosures import tolerated_by_point_masses
-from cspr_jax.families.swings.proof.limit_screen import LimitSieve
+from cspr_jax.families.swings.proof.limit_screen import LimitScreen
 from cspr_jax.families.swings.proof.margins import each_margin, margins
 from cspr_jax.families.swings.proof.screen import upper_bounds
-from cspr_jax.families.swings.proof.verdicts import first_look, prove
+from cspr_jax.families.swings.proof.verdicts import first_pass, prove
 from cspr_jax.families.swings.refusals import refusals, unavoidable
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
@@ -44,8 +44,10 @@ if TYPE_CHECKING:
 BATCH = 4096
 # Candidates whose margins differ by less are equally good; the first of them is reported.
 TIE = 1e-9
-# Samples of the second, denser sieve, multiples of 4. Segments that it takes at a time: few need it.
-SAMPLES_PER_ARC, MOST_SAMPLES, DENSE_BATCH = 32, 1024, 512
+# Of the second, denser screen; samples are multiples of 4.
+SAMPLES_PER_ARC = 32
+MAX_SAMPLES = 1024
+DENSE_BATCH = 512  # segments at a time: few need it
 
 
 @persistent_jit
@@ -53,7 +55,7 @@ def _durations(arguments) -> jax.Array:
     return jax.vmap(hypocycloid.duration)(*arguments)
 
 
-class Known(NamedTuple):
+class ProvedArcs(NamedTuple):
     """Numbers of arcs proved feasible by other means than `families.swings.proof.verdicts`.
 
     Fields:
@@ -73,14 +75,14 @@ def decided(
     infinity: Float[np.ndarray, "n"],
     *,
     arcs: np.ndarray | None = None,
-    known: Known | None = None,
+    precomputed: ProvedArcs | None = None,
     measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
 ) -> tuple[Answers, Segment]:
     """Answers from upper bounds."""
-    known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
+    precomputed = precomputed or ProvedArcs(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
     with_limits = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
     basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
-    search = _search(problem, parities, with_limits, known)
+    search = _search(problem, parities, with_limits, precomputed)
     smallest, bound = search.smallest, search.bound
     tried, slack, broken = _shown(problem, parities, search, with_limits, basic, measure)
     chosen = pick(parities, np.arange(len(smallest)), tried)
@@ -89,10 +91,10 @@ def decided(
     is_feasible = smallest > 0
     if len(none):
         shown = pick(parities, none, tried[none])
-        look = first_look(problem, shown, tried[none].astype(float))
-        bound[none] = look[1][:, :BASIC].min(1)
+        coarse = first_pass(problem, shown, tried[none].astype(float))
+        bound[none] = coarse[1][:, :BASIC].min(1)
         if problem.limits.uncertainty is not None:
-            is_feasible[none] = prove(problem, shown, tried[none], look=look).feasible
+            is_feasible[none] = prove(problem, shown, tried[none], coarse=coarse).feasible
     multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
     answers = Answers(
         smallest,
@@ -135,7 +137,7 @@ def only(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max
 class _Search(NamedTuple):
     # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin,
     # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty, and the
-    # limits that candidates are known to break, (n, max_arcs, n_criteria).
+    # limits that samples show candidates to break, (n, max_arcs, n_criteria).
     smallest: np.ndarray
     doubtful: np.ndarray
     bound: np.ndarray
@@ -143,18 +145,21 @@ class _Search(NamedTuple):
     broken: np.ndarray
 
 
-def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known) -> _Search:
+def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, precomputed: ProvedArcs) -> _Search:
     smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
     is_planned = np.zeros(len(upper), bool)
-    sieve = LimitSieve(problem, parities, upper >= -SMALLEST_MARGIN)
+    screen = LimitScreen(problem, parities, upper >= -SMALLEST_MARGIN)
     while True:
-        rows = sieve.look(np.flatnonzero(smallest == 0))
+        rows = screen.screened(np.flatnonzero(smallest == 0))
         if not len(rows):
-            return _Search(smallest, doubtful, bound, is_planned, sieve.broken)
-        arcs = np.argmax(sieve.alive[rows], axis=1) + 1
-        is_known = arcs == known.arcs[rows]
-        smallest[rows[is_known]], bound[rows[is_known]] = arcs[is_known], known.bound[rows[is_known]]
-        rows, arcs = rows[~is_known], arcs[~is_known]
+            return _Search(smallest, doubtful, bound, is_planned, screen.broken)
+        arcs = np.argmax(screen.alive[rows], axis=1) + 1
+        is_precomputed = arcs == precomputed.arcs[rows]
+        smallest[rows[is_precomputed]], bound[rows[is_precomputed]] = (
+            arcs[is_precomputed],
+            precomputed.bound[rows[is_precomputed]],
+        )
+        rows, arcs = rows[~is_precomputed], arcs[~is_precomputed]
         if not len(rows):
             continue
         proof = prove(problem, pick(parities, rows, arcs), arcs)
@@ -169,7 +174,7 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
         smallest[rows[is_feasible]] = arcs[is_feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~is_feasible & ~is_refuted]] = True
-        sieve.alive[rows, arcs - 1] = False
+        screen.alive[rows, arcs - 1] = False
 
 
 class _Shown(NamedTuple):
@@ -236,7 +241,7 @@ def _best(
 def _largest_margins(
     problem: Problem, parities: dict[int, Segment], upper: np.ndarray, measure: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return the numbers of arcs with the largest margins, and their slacks; upper bounds say where to look next.
+    # Return the numbers of arcs with the largest margins, and their slacks; upper bounds give the order.
     upper = np.fmin(upper, _denser_upper_bounds(problem, parities, upper.shape[1]))
     tried = np.argmax(upper, axis=1) + 1
     slack = measure(problem, pick(parities, np.arange(len(tried)), tried), tried)
@@ -266,8 +271,8 @@ def _improvement(best: np.ndarray) -> np.ndarray:
 
 
 def _denser_upper_bounds(problem: Problem, parities: dict[int, Segment], max_arcs: int) -> np.ndarray:
-    # The first sieve has a sample an arc or two, which bounds the margins of many arcs loosely.
-    samples = min(SAMPLES_PER_ARC * max_arcs, MOST_SAMPLES)
+    # The first screen has a sample an arc or two, which bounds the margins of many arcs loosely.
+    samples = min(SAMPLES_PER_ARC * max_arcs, MAX_SAMPLES)
     kernel = partial(upper_bounds, max_arcs=max_arcs, samples=samples)
     return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), batch_size=DENSE_BATCH)
 
@@ -276,7 +281,7 @@ def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.n
     # Return the multiples of all segments: NaN of those that are not feasible as planned, and without an uncertainty.
     multiples = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
     if problem.limits.uncertainty is not None and len(rows):
-        picked = jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments)
+        picked = jax.tree.map(lambda array: np.asarray(array)[rows], segments)
         for column, values in zip(multiples, tolerated_by_point_masses(problem, picked, arcs[rows]), strict=True):
             column[rows] = values
     return multiples

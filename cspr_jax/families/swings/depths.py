@@ -37,13 +37,13 @@ def conservative_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float
     """
     below, depth, normal = _depths(robot, targets)
     height, square = below[:, 2], (below**2).sum(1)
-    slope = 1.0 - 1.0 / (normal @ normal)  # 0 for a level plane
-    inside = height**2 - slope * square
+    sine_squared = 1.0 - 1.0 / (normal @ normal)  # of its inclination
+    inside = height**2 - sine_squared * square
     if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
         return float("nan")
     root = np.sqrt(inside)
     with np.errstate(over="ignore"):  # a target a hair below the spools: no z0 will do
         lowest = float((square / (height + root)).max())
-    if slope > 0.0 and lowest >= float(((height + root) / slope).min()):
+    if sine_squared > 0.0 and lowest >= float(((height + root) / sine_squared).min()):
         return float("nan")
     return lowest

@@ -1,7 +1,7 @@
 """The standard hypocycloid between two points, thesis chapter 2.
 
 The effector swings in a plane through p0, the point below the centroid at depth z0. Its path is a
-hypocycloid whose size changes from r1 to r2; every arc ends in a cusp. With lambda = g / z0 the
+hypocycloid whose radius changes from r1 to r2; every arc ends in a cusp. With lambda = g / z0 the
 end accelerations are those of a pendulum hung from the centroid.
 
 Two forms of the same motion stand here. `motion` is the printed one, (2.32) to (2.48). `swing` is
@@ -53,7 +53,7 @@ class Segment:
     """Parameters of one segment, for one parity of the number of arcs.
 
     With c the position in the plane of the trajectory and d = c + c'' / lambda, the normalised
-    pseudotension of cable k is 1 + tilt . c + pull_k . d + twist_k (c x d).
+    pseudotension of cable k is 1 + tilt . c + coupling_k . d + twist_k (c x d).
 
     Fields:
         plane: (3, 2) unit vectors q_h1 and q_h2 of (2.30), as columns.
@@ -64,8 +64,8 @@ class Segment:
         sense: () +1 (p odd) or -1 (p even): sign of theta_h, (2.34).
         rate: () lambda of (2.26), 1/s^2.
         end_curvature: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
-        tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
-        pull: (n_cables, 2) one row for each cable, 1/m.
+        tilt: (2,) gradient of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
+        coupling: (n_cables, 2) one row for each cable, 1/m.
         twist: (n_cables,) one for each cable, 1/m^2.
     """
 
@@ -78,7 +78,7 @@ class Segment:
     rate: Array
     end_curvature: Array
     tilt: Array
-    pull: Array
+    coupling: Array
     twist: Array
 
 
@@ -88,7 +88,7 @@ def couplings(
     """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
 
     With d = c + c'' / lambda and lambda = gravity / z0, from (2.12) to (2.14) divided by their value
-    at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
+    at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + coupling_k . d + twist_k (c x d).
     """
     if robot.n_cables > robot.dof:
         nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
@@ -102,9 +102,9 @@ def couplings(
     scale = 3.0 / (area[2] * center[2])
     opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
     tilt = point_mass.plane_normal(robot) @ axes / center[2]
-    pull = -scale * (jnp.cross(center, opposite) + area[None] / 3.0) @ axes
+    coupling = -scale * (jnp.cross(center, opposite) + area[None] / 3.0) @ axes
     twist = scale * (opposite @ jnp.cross(axes[:, 0], axes[:, -1]))
-    return tilt, pull, twist
+    return tilt, coupling, twist
 
 
 @jax.jit
@@ -117,11 +117,13 @@ def segment(
     odd: Bool[Array, ""],
 ) -> Segment:
     """The segment from one point to another."""
-    center, size = point_mass.rest_point(z0), point_mass.spool_radius(robot)
-    plane, r1, r2, precession = swing_plane(start - center, end - center, size, point_mass.plane_normal(robot), odd)
-    tilt, pull, twist = couplings(robot, center, plane)
+    center, radius = point_mass.rest_point(z0), point_mass.spool_radius(robot)
+    plane, r1, r2, precession = swing_plane(start - center, end - center, radius, point_mass.plane_normal(robot), odd)
+    tilt, coupling, twist = couplings(robot, center, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
-    return Segment(plane, center, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
+    return Segment(
+        plane, center, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, coupling, twist
+    )
 
 
 class Oscillation(NamedTuple):
@@ -129,7 +131,7 @@ class Oscillation(NamedTuple):
 
     Fields:
         ratio: () nu = delta / (pi p) of the axes of the ellipse.
-        steady: () theta_h^2 (n_h - 1) of (2.47): T^2 times the square of the frequency at constant size.
+        steady: () theta_h^2 (n_h - 1) of (2.47): T^2 times the square of the frequency at constant radius.
         period: () T^2 lambda: the same, less A''(1) of a transition, (1.29).
     """
 
@@ -155,7 +157,7 @@ def duration(segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
 def swing(
     segment: Segment, amplitude_values: tuple[Float[Array, ""], ...], arcs: Num[Array, ""], tau: Float[Array, ""]
 ) -> tuple[Float[Array, "2"], Float[Array, "2"]]:
-    """Closed form of the motion in the plane of the trajectory, at one instant.
+    """Closed form of the motion in the plane of the trajectory, at one time.
 
     In the frame e_r, e_t that precesses with the ellipse, with C, S the cosine and sine of the
     phase sense pi p tau and ' = d / dtau,
@@ -183,7 +185,7 @@ def swing(
 def motion(
     segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
 ) -> tuple[Float[Array, "3"], Float[Array, "3"], Float[Array, "3"]]:
-    """Position, velocity and acceleration at one instant, as printed in (2.31) to (2.48)."""
+    """Position, velocity and acceleration at one time, as printed in (2.31) to (2.48)."""
     theta = segment.sense * math.pi * (arcs - segment.precession)  # (2.34)
     n = 2.0 * math.pi * arcs / jnp.abs(theta)  # (2.35)
     slow, fast = theta * tau, (n - 1.0) * theta * tau
@@ -252,7 +254,7 @@ def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
 
 @jax.jit
 def batch_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
-    """Bounds of the states of several motions, over one block of each."""
+    """Bounds of the states of some motions, over one block of each."""
     return jax.vmap(_block_bounds)(*cases)
 
 
@@ -268,7 +270,7 @@ def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Arr
 
 
 def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Float[Array, ""]) -> Float[Array, ""]:
-    """Smallest normalised pseudotension as the number of arcs of this parity grows, at one instant.
+    """Smallest normalised pseudotension as the number of arcs of this parity grows, at one time.
 
     1 - r(tau) |tilt . e_r(tau)|: exact, where (2.55) bounds the direction of the swing by the worst.
     """

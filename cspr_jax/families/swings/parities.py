@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
     """Pick segments, each of the parity of its number of arcs."""
     if parities[0] is parities[1]:
-        return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
+        return jax.tree.map(lambda array: np.asarray(array)[rows], parities[0])
     is_odd = arcs % 2 == 1
 
     def choose(even, odd):
@@ -28,5 +28,5 @@ def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.
 def rows_of(parities: dict[int, Segment], rows: Int[np.ndarray, "m"]) -> dict[int, Segment]:
     """Pick segments, of both parities."""
     return {
-        parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments) for parity, segments in parities.items()
+        parity: jax.tree.map(lambda array: np.asarray(array)[rows], segments) for parity, segments in parities.items()
     }

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
 BATCH = 512
-# Samples an arc: of a first look, and of one before a proof.
-FEW, MANY = 4, 32
+FEW = 4  # samples an arc, to begin with
+MANY = 32  # before a proof
 # Slacks that are not those of limits: of the tensions, and of the depth below the spools.
 BASIC = 2
 
@@ -52,7 +52,7 @@ class _Trials(NamedTuple):
 
 
 @jax.jit
-def _instants(problem: Problem, items) -> jax.Array:
+def _slacks_at(problem: Problem, items) -> jax.Array:
     robot, limits = problem.robot, problem.limits
     low, high = tension_range(robot, limits)
 
@@ -153,7 +153,7 @@ def least_slacks(
     is_narrowed: bool = False,
 ) -> Float[np.ndarray, "m n_slacks"]:
     """Smallest sampled slacks of segments with one number of arcs."""
-    kernel, chosen = partial(_instants, problem), jax.tree.map(lambda x: np.asarray(x)[rows], segments)
+    kernel, chosen = partial(_slacks_at, problem), jax.tree.map(lambda x: np.asarray(x)[rows], segments)
 
     def at(tau: np.ndarray) -> np.ndarray:
         row = np.repeat(np.arange(len(rows)), tau.shape[1])

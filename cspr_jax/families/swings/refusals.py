@@ -11,7 +11,7 @@ from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.families.swings.parities import pick
 from cspr_jax.families.swings.proof.criteria import BASIC, flags
 from cspr_jax.families.swings.proof.limit_screen import broken_at_samples, upcoming
-from cspr_jax.families.swings.proof.verdicts import SMALL, first_look, is_met_at_samples, prove
+from cspr_jax.families.swings.proof.verdicts import SMALL, first_pass, is_met_at_samples, prove
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
@@ -26,7 +26,7 @@ def refusals(
     problem: Problem,
     parities: dict[int, Segment],
     upper: Float[np.ndarray, "n max_arcs"],
-    known: Bool[np.ndarray, "n max_arcs n_criteria"],
+    refuted: Bool[np.ndarray, "n max_arcs n_criteria"],
 ) -> Refused:
     """Limits that refuse segments whose cables some number of arcs keeps taut."""
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
@@ -36,7 +36,7 @@ def refusals(
             return fewest.refused()
         rows, arcs = upcoming(alive, rows)
         alive[rows, arcs - 1] = False
-        tells = fewest.may_change(rows, known[rows, arcs - 1])
+        tells = fewest.may_change(rows, refuted[rows, arcs - 1])
         rows, arcs = rows[tells], arcs[tells]
         if not len(rows):
             continue
@@ -47,7 +47,7 @@ def refusals(
         left = np.argsort(rank, kind="stable")
         while len(left):
             left = left[~fewest.is_best[rows[left]]]
-            left = left[fewest.may_change(rows[left], known[rows[left], arcs[left] - 1])]
+            left = left[fewest.may_change(rows[left], refuted[rows[left], arcs[left] - 1])]
             # The next ones of the same segments fill a batch, which takes as long whatever it holds.
             count = max(int(np.searchsorted(rank[left], rank[left[:1]], side="right").sum()), SMALL)
             batch, left = left[:count], left[count:]
@@ -62,18 +62,18 @@ def _limits_of(
     problem: Problem, parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray, fewest: FewestLimits
 ) -> tuple[np.ndarray, np.ndarray]:
     # Return which of some candidates with taut cables break limits that are certain, and these (n, n_criteria).
-    # Candidates that change nothing by the limits that they are seen to break are not looked at more closely.
+    # Candidates that change nothing by the limits that samples show them to break are not proved.
     segments = pick(parities, rows, arcs)
-    look = first_look(problem, segments, arcs.astype(float))
+    coarse = first_pass(problem, segments, arcs.astype(float))
     is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC
-    proof = prove(problem, segments, arcs, ignored=np.ones((len(arcs), len(is_limit)), bool), look=look)
+    proof = prove(problem, segments, arcs, ignored=np.ones((len(arcs), len(is_limit)), bool), coarse=coarse)
     is_proved, broken = np.ones(len(arcs), bool), proof.broken & is_limit
     unclear = np.flatnonzero((is_limit & ~broken & ~proof.met).any(1) & fewest.may_change(rows, broken))
     for _ in range(int(is_limit.sum()) + 1):
         if not len(unclear):
             break
-        part, seen = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], (segments, look))
-        again = prove(problem, part, arcs[unclear], ignored=broken[unclear] | ~is_limit, look=seen)
+        part, seen = jax.tree.map(lambda array, rows=unclear: array[rows], (segments, coarse))
+        again = prove(problem, part, arcs[unclear], ignored=broken[unclear] | ~is_limit, coarse=seen)
         is_proved[unclear] = again.feasible
         broken[unclear] |= again.broken & is_limit
         unclear = unclear[again.infeasible]

@@ -10,5 +10,5 @@ Files, each importing only from those above it:
     verdicts       verdicts that hold between the samples
     margins        smallest slacks, refined
     screen         upper bounds of the margins of all numbers of arcs at once
-    limit_screen   candidates that a few instants refute by a limit
+    limit_screen   candidates that a few samples refute by a limit
 """

@@ -1,4 +1,4 @@
-"""Blocks of a segment for a first look: cuts between the knots of the amplitude function."""
+"""Blocks of a segment for a first pass: cuts between the knots of the amplitude function."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ STEP = 32
 
 
 def blocks(
-    amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1
+    amplitude: Amplitude, max_arcs: int, *, density: int = 1, minimum: int = 1
 ) -> tuple[Num[np.ndarray, "n_rows n_edges"], Int[np.ndarray, "n_rows"]]:
     """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot."""
     pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
     n_rows = _rounded(max_arcs + 1)
     rows = []
     for arcs in range(n_rows):
-        n_blocks = max(density * (arcs + 4), least)
+        n_blocks = max(density * (arcs + 4), minimum)
         cuts = [np.linspace(a, b, 1 + math.ceil(n_blocks * (b - a) - 1e-9))[:-1] for a, b in pieces]
         rows.append(np.concatenate([*cuts, [1.0]]))
     counts = np.array([len(row) - 1 for row in rows], np.int32)
@@ -58,7 +58,7 @@ def over_blocks(
 
     def body(i, state):
         later = together * i + jnp.arange(together, dtype=jnp.int32)[:, None]
-        place = row[None] + jnp.minimum(later, count[None] - 1)
-        return step(state, flat[place], flat[place + 1])
+        at = row[None] + jnp.minimum(later, count[None] - 1)
+        return step(state, flat[at], flat[at + 1])
 
     return lax.fori_loop(0, (jnp.max(count) + (together - 1)) // together, body, first)

@@ -10,7 +10,7 @@ from jax import Array
 
 from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.families.swings.proof.limit_slacks import count, limit_curvatures, limit_slacks
-from cspr_jax.families.swings.proof.slacks import each_taut_bounds, instant, row_bounds, stretch
+from cspr_jax.families.swings.proof.slacks import each_taut_bounds, interval_bounds, row_bounds, swing_state
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.linear.lanes import largest, smallest
@@ -44,8 +44,8 @@ def smooth_slacks(
     arcs: Num[Array, ""],
     tau: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
-    """Every slack of every criterion, at one instant: smooth functions of tau."""
-    state = instant(segment, amplitude, arcs, tau)
+    """Every slack of every criterion, at one time: smooth functions of tau."""
+    state = swing_state(segment, amplitude, arcs, tau)
     terms = [*state.kappa, state.eta]
     for slack in limit_slacks(robot, limits, segment, arcs, tau, state):
         terms += slack
@@ -60,7 +60,7 @@ def slacks(
     arcs: Num[Array, ""],
     tau: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
-    """The smallest slack of each criterion, at one instant."""
+    """The smallest slack of each criterion, at one time."""
     values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
     return tuple(smallest(list(itertools.islice(values, n))) for n in counts(robot, limits))
 
@@ -75,7 +75,7 @@ def curvatures(
     stop: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
     """Bound of the second derivative of each criterion's slacks over an interval."""
-    over = stretch(segment, amplitude, arcs, start, stop)
+    over = interval_bounds(segment, amplitude, arcs, start, stop)
     kappa = each_taut_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     return (

@@ -12,8 +12,8 @@ from jax import Array
 
 from cspr_jax.families.swings.hypocycloid import Segment, duration, motion
 from cspr_jax.families.swings.proof.blocks import INTERVALS
-from cspr_jax.families.swings.proof.limit_slacks import pace_bounds
-from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.families.swings.proof.limit_slacks import motion_bounds
+from cspr_jax.families.swings.proof.slacks import interval_bounds, row_bounds, swing_state, taut_bounds
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
@@ -24,11 +24,11 @@ from cspr_jax.verification.robustness.uncertainty import requirements_of
 if TYPE_CHECKING:
     from jaxtyping import Num
 
-# Parts of an arc that are looked at first, and blocks computed at a time.
-PARTS, BATCH = 4, 1024
+PARTS = 4  # of an arc, to begin with
+BATCH = 1024  # blocks computed at a time
 
 
-class _Known(NamedTuple):
+class _BlockValues(NamedTuple):
     # Values of one block: the first three in its middle, then bounds within it.
     rays: Array
     velocity: Array
@@ -41,20 +41,20 @@ class _Known(NamedTuple):
 
 
 @jax.jit
-def _enclosed(problem: Problem, items) -> _Known:
+def _enclosed(problem: Problem, items) -> _BlockValues:
     return jax.vmap(partial(_block, problem))(*items)
 
 
-def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array) -> _Known:
+def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array) -> _BlockValues:
     robot, amplitude = problem.robot, problem.amplitude
     half, time = 0.5 * (stop - start), duration(segment, arcs)
-    over = stretch(segment, amplitude, arcs, start, stop)
+    over = interval_bounds(segment, amplitude, arcs, start, stop)
     weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
-    instants = jax.vmap(lambda tau: instant(segment, amplitude, arcs, tau))(start * (1.0 - weight) + stop * weight)
+    states = jax.vmap(lambda tau: swing_state(segment, amplitude, arcs, tau))(start * (1.0 - weight) + stop * weight)
     step = (2.0 * half / INTERVALS) ** 2 / 8.0
-    kappa, taut = jnp.stack(instants.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
+    kappa, taut = jnp.stack(states.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
     level = row_bounds(segment, arcs, over, segment.tilt).curvature * step
-    eta = jnp.min(instants.eta) - level, jnp.max(instants.eta) + level
+    eta = jnp.min(states.eta) - level, jnp.max(states.eta) + level
     scale = segment.rate / robot.base_points.shape[0]
 
     def fraction(top, is_low):
@@ -63,16 +63,16 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
         return jnp.where(eta[0] > 0.0, scale * top / bottom, jnp.where(is_low, -jnp.inf, jnp.inf))
 
     position, velocity, acceleration = motion(segment, amplitude, arcs, over.middle)
-    pace, pull = pace_bounds(segment, arcs, over)
-    return _Known(
+    position_bounds, acceleration_bounds = motion_bounds(segment, arcs, over)
+    return _BlockValues(
         position[None] - robot.base_points,
         velocity,
         acceleration,
         fraction(jnp.min(kappa, axis=0) - taut, True),
         fraction(jnp.max(kappa, axis=0) + taut, False),
-        0.5 * half * half * pace.curvature,
-        half * pace.curvature / time,
-        half * pull.derivative / time**2,
+        0.5 * half * half * position_bounds.curvature,
+        half * position_bounds.curvature / time,
+        half * acceleration_bounds.derivative / time**2,
     )
 
 
@@ -84,30 +84,30 @@ def _durations(items) -> Array:
 def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
     """Enclosure of blocks of motions."""
     items = (*jax.tree.map(lambda x: np.asarray(x)[blocks.row], (segments, arcs.astype(float))), *blocks[1:])
-    known: Any = in_batches(partial(_enclosed, problem), items, batch_size=BATCH)
-    count, n_cables = known.rays.shape[:2]
+    values: Any = in_batches(partial(_enclosed, problem), items, batch_size=BATCH)
+    count, n_cables = values.rays.shape[:2]
     nothing, each = np.zeros(count), (count, n_cables, 3)
     half = 0.5 * (blocks.stop - blocks.start)
-    way = (half * in_batches(_durations, items[:2], batch_size=BATCH))[:, None] * known.velocity
-    moved = largest_moves(way, known.deviation)[:, None]
-    lengths, longest = np.linalg.norm(known.rays, axis=2), touchable(problem).limits.cable_length_max
-    room = np.zeros((count, 0)) if longest is None else np.asarray(longest) - lengths
-    once = np.ones(room.shape)
-    changes = [np.repeat(x[:, None], n_cables, axis=1) for x in (known.velocity_change, known.acceleration_change)]
-    vectors = [np.broadcast_to(x[:, None], each) for x in (known.velocity, known.acceleration)]
+    tangent = (half * in_batches(_durations, items[:2], batch_size=BATCH))[:, None] * values.velocity
+    moved = largest_moves(tangent, values.deviation)[:, None]
+    lengths, longest = np.linalg.norm(values.rays, axis=2), touchable(problem).limits.cable_length_max
+    slack = np.zeros((count, 0)) if longest is None else np.asarray(longest) - lengths
+    once = np.ones(slack.shape)
+    changes = [np.repeat(x[:, None], n_cables, axis=1) for x in (values.velocity_change, values.acceleration_change)]
+    vectors = [np.broadcast_to(x[:, None], each) for x in (values.velocity, values.acceleration)]
     return Enclosure(
-        rays=known.rays,
+        rays=values.rays,
         arms=np.zeros((n_cables, 3)),
-        force=known.acceleration - np.array([0.0, 0.0, float(problem.robot.gravity)]),
+        force=values.acceleration - np.array([0.0, 0.0, float(problem.robot.gravity)]),
         moment=np.zeros((count, 3)),
         acceleration_matrix=np.zeros((count, 3, 3)),
-        tangent=np.broadcast_to(way[:, None], each),
-        deviation=np.repeat(known.deviation[:, None], n_cables, axis=1),
-        force_change=known.acceleration_change,
+        tangent=np.broadcast_to(tangent[:, None], each),
+        deviation=np.repeat(values.deviation[:, None], n_cables, axis=1),
+        force_change=values.acceleration_change,
         acceleration_matrix_change=nothing,
-        low=known.low,
-        high=known.high,
-        distances=Distances(room, moved * once, *(0.0 * once,) * 3, np.ones(room.shape[1]), room, once),
+        low=values.low,
+        high=values.high,
+        distances=Distances(slack, moved * once, *(0.0 * once,) * 3, np.ones(slack.shape[1]), slack, once),
         rates=Rates(vectors[0], vectors[1], *changes),
     )
 

@@ -1,6 +1,6 @@
-"""A second sieve, of limits: a few instants refute most numbers of arcs that break a limit by far.
+"""A second screen, of limits: a few samples refute most numbers of arcs that break a limit by far.
 
-It looks at candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a
+It takes candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a
 limit by more than rounding is a refutation; nothing is accepted here.
 """
 
@@ -33,8 +33,8 @@ SAMPLES = 32
 FAR = 2.0
 
 
-class LimitSieve:
-    """Candidates of n segments: which are left, and the limits that each is known to break.
+class LimitScreen:
+    """Candidates of n segments: which are left, and the limits that samples show each to break.
 
     Args:
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
@@ -42,18 +42,18 @@ class LimitSieve:
 
     Attributes:
         alive: (n, max_arcs) candidates that are not refuted.
-        broken: (n, max_arcs, n_criteria) criteria that a candidate is known to break; only limits.
+        broken: (n, max_arcs, n_criteria) criteria that a candidate breaks at a sample; only limits.
     """
 
     def __init__(self, problem: Problem, parities: dict[int, Segment], alive: np.ndarray) -> None:
-        """No candidate is looked at yet."""
+        """No candidate is screened yet."""
         n_limits = len(limits_set(problem.limits))
         self._problem, self._parities = problem, parities
         self._unseen = alive.copy() if n_limits else np.zeros_like(alive)
         self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
 
-    def look(self, rows: Int[np.ndarray, "m"]) -> Int[np.ndarray, "k"]:
-        """Look at candidates until none that comes first is refuted."""
+    def screened(self, rows: Int[np.ndarray, "m"]) -> Int[np.ndarray, "k"]:
+        """Screen candidates until none that comes first is refuted."""
         while True:
             rows = rows[self.alive[rows].any(1)]
             open_rows = rows[self._unseen[rows, np.argmax(self.alive[rows], axis=1)]]
@@ -93,5 +93,5 @@ def _lowest(problem: Problem, arguments) -> tuple[Array, Array]:
     segments, arcs = arguments
     tau = jnp.broadcast_to(((jnp.arange(SAMPLES, dtype=arcs.dtype) + 0.5) / SAMPLES)[:, None], (SAMPLES, len(arcs)))
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
-    near = jax.vmap(partial(tolerance, problem.amplitude, least=0.0))(segments, arcs)
+    near = jax.vmap(partial(tolerance, problem.amplitude, minimum=0.0))(segments, arcs)
     return jnp.stack(smallest_of_each(values[BASIC:]), axis=1), near

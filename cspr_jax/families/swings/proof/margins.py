@@ -1,4 +1,4 @@
-"""The smallest value along a segment of functions of one instant, refined between the samples.
+"""The smallest value along a segment of functions of time, refined between the samples.
 
 Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
 three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
@@ -30,9 +30,12 @@ if TYPE_CHECKING:
 
 CANDIDATES = 3
 # An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
-LAST_BITS, LARGEST = 2**16 - 1, 1e300
+LAST_BITS = 2**16 - 1
+LARGEST = 1e300
 # Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
-FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
+FIRST_WIDTH = 1.0 / 4.0
+NARROWER = 1.0 / 6.0
+ROUNDS = 7
 
 
 def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array):
@@ -52,8 +55,8 @@ def _marked(estimates: Array, fractions: Array) -> Array:
     # Write a number from 0 to 1 into the last bits of another one: the smallest of such numbers says where it lies. XLA
     # computes an argmin one number at a time, and several minima in one loop only if nothing else is found.
     numbers = jnp.where(estimates < LARGEST, estimates, LARGEST)  # neither is NaN
-    mark = jnp.round(fractions * LAST_BITS).astype(jnp.int64)
-    return lax.bitcast_convert_type(lax.bitcast_convert_type(numbers, jnp.int64) & ~LAST_BITS | mark, jnp.float64)
+    bits = jnp.round(fractions * LAST_BITS).astype(jnp.int64)
+    return lax.bitcast_convert_type(lax.bitcast_convert_type(numbers, jnp.int64) & ~LAST_BITS | bits, jnp.float64)
 
 
 def _unmarked(marked: Array) -> tuple[Array, Array]:
@@ -61,17 +64,17 @@ def _unmarked(marked: Array) -> tuple[Array, Array]:
     return lax.bitcast_convert_type(bits & ~LAST_BITS, jnp.float64), (bits & LAST_BITS).astype(jnp.float64) / LAST_BITS
 
 
-def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
-    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
-    # blocks than others sees its last block again: a place that is known is not new.
-    estimate = jnp.where((best[1] == place[None]).any(0), jnp.inf, estimate)
-    estimates, places = [], []
-    for old_estimate, old_place in zip(*best, strict=True):
+def _insert(best: tuple[Array, Array], estimate: Array, at: Array) -> tuple[Array, Array]:
+    # Keep the candidates in order, the new one in order; leaves (CANDIDATES, n_values, n). A segment with fewer
+    # blocks than others sees its last block again: a time that is there is not new.
+    estimate = jnp.where((best[1] == at[None]).any(0), jnp.inf, estimate)
+    estimates, times = [], []
+    for old_estimate, old_at in zip(*best, strict=True):
         first = estimate < old_estimate
         estimates.append(jnp.where(first, estimate, old_estimate))
-        places.append(jnp.where(first, place, old_place))
-        estimate, place = jnp.where(first, old_estimate, estimate), jnp.where(first, old_place, place)
-    return jnp.stack(estimates), jnp.stack(places)
+        times.append(jnp.where(first, at, old_at))
+        estimate, at = jnp.where(first, old_estimate, estimate), jnp.where(first, old_at, at)
+    return jnp.stack(estimates), jnp.stack(times)
 
 
 def refined_minimum(
@@ -104,7 +107,7 @@ def refined_minimum(
 
 
 class Functions(NamedTuple):
-    """Smooth functions of one instant in groups, each with one smallest value to be found.
+    """Smooth functions of time in groups, each with one smallest value to be found.
 
     Fields:
         evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.
@@ -115,22 +118,22 @@ class Functions(NamedTuple):
     groups: tuple[int, ...]
 
 
-def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) -> tuple[Array, Array]:
+def _best_of_groups(groups: tuple[int, ...], estimates: Array, times: Array) -> tuple[Array, Array]:
     # Choose the best candidates of each group, whatever function they are of: the number of the function, and where;
     # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
     functions, taus, first = [], [], 0
-    for size in groups:
-        columns = slice(first, first + size)
-        values, where = (x[:, columns].reshape(CANDIDATES * size, -1) for x in (estimates, places))
-        number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
+    for n in groups:
+        columns = slice(first, first + n)
+        values, where = (x[:, columns].reshape(CANDIDATES * n, -1) for x in (estimates, times))
+        number = jnp.broadcast_to(jnp.arange(CANDIDATES * n)[:, None], values.shape)
         for _ in range(CANDIDATES):
             is_lowest = values == jnp.min(values, axis=0, keepdims=True)
-            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * size), axis=0)
+            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * n), axis=0)
             is_chosen = number == chosen[None]
-            functions.append(first + chosen % size)
+            functions.append(first + chosen % n)
             taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
             values = jnp.where(is_chosen, jnp.inf, values)
-        first += size
+        first += n
     shape = (len(groups), CANDIDATES, -1)
     return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
 
@@ -153,8 +156,8 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
 
     nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
     nowhere = jnp.full_like(nothing, -1.0)
-    estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
-    number, where = _best_of_groups(groups, estimates, places)
+    estimates, times = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
+    number, where = _best_of_groups(groups, estimates, times)
     steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
 
     def refine(segment, p, number, where, width):
@@ -170,7 +173,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
 def smallest_values(
     functions: Functions, problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], table
 ) -> Float[np.ndarray, "n n_groups"]:
-    """Smallest values along each segment of functions of one instant."""
+    """Smallest values along each segment of functions of time."""
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
@@ -186,16 +189,16 @@ def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> 
     segments with limits, where all slacks are positive, the smaller one of the cables' and the depth's stands in the
     first two columns, and the smallest one of the limits in the others: refining two numbers takes less time.
     """
-    sizes = counts(problem.robot, problem.limits)
-    if len(sizes) == BASIC or len(arcs) <= SMALL:
+    groups = counts(problem.robot, problem.limits)
+    if len(groups) == BASIC or len(arcs) <= SMALL:
         return each_margin(problem, segments, arcs)
     table = blocks(problem.amplitude, int(np.max(arcs)))
-    both = sum(sizes[:BASIC]), sum(sizes[BASIC:])
+    both = sum(groups[:BASIC]), sum(groups[BASIC:])
     minimum = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
-    smallest = np.repeat(minimum, [BASIC, len(sizes) - BASIC], axis=1)
+    smallest = np.repeat(minimum, [BASIC, len(groups) - BASIC], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(minimum) & (minimum > 0.0)).all(1))
     if len(unclear):
-        part, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
+        part, numbers = jax.tree.map(lambda array: np.asarray(array)[unclear], (segments, np.asarray(arcs)))
         smallest[unclear] = each_margin(problem, part, numbers)
     return smallest
 

@@ -1,4 +1,4 @@
-"""A first sieve over all numbers of arcs at once: upper bounds of the margin, fast.
+"""A first screen of all numbers of arcs at once: upper bounds of the margin, fast.
 
 The closed form splits a pseudotension into what depends on the points and what depends only on the
 number of arcs and tau. The second is a table; the precession is the same for all numbers of arcs of
@@ -6,7 +6,7 @@ one parity. What is left of a check is some fifty multiplications and additions 
 A fusion runs over the segments of a batch and takes several samples at a time, so that a segment's
 own numbers stay in registers and no array of segments by samples is made but the precession.
 
-The sieve rejects candidates; it accepts none. `families.swings.proof.verdicts` decides about the rest.
+The screen rejects candidates; it accepts none. `families.swings.proof.verdicts` decides about the rest.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def sample_table(
     """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A."""
     phase = math.pi * arcs[:, None] * tau
     cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
-    size, slope, second_derivative = (
+    value, rate, second_derivative = (
         jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2)
     )
-    return jnp.stack([cosine, sine, size, second_derivative, second_derivative * cosine, slope * sine], axis=1).astype(
+    return jnp.stack([cosine, sine, value, second_derivative, second_derivative * cosine, rate * sine], axis=1).astype(
         dtype
     )
 
@@ -57,14 +57,14 @@ def sample_table(
 def smallest_sampled(
     amplitude: Amplitude, segments: Segment, arcs: Int[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
 ) -> Float[Array, "n_arcs n"]:
-    """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity."""
+    """Smallest normalised pseudotension, or depth ratio, over samples, for some numbers of arcs of one parity."""
     dtype = segments.rate.dtype
     start, span = segments.start_radius, segments.end_radius - segments.start_radius
     laterals, axials = sincospi(jnp.asarray(tau, dtype)[:, None] * segments.precession[None, :])
     # The sense of the rotation mirrors the second axis; after that every quantity is that of sense +1.
     mirror = jnp.stack([jnp.ones_like(span), segments.sense], axis=-1)
     tilt = tuple((segments.tilt * mirror).T)
-    rows = [(*(segments.pull[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
+    rows = [(*(segments.coupling[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
 
     def one(candidate):
         p, table = candidate
@@ -73,23 +73,23 @@ def smallest_sampled(
         second_derivative, radial_rate = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
 
         def check(i, smallest):
-            cosine, sine, size, a2, a2_cosine, a1_sine = (table[column, i] for column in range(6))
-            lateral, axial, r, small = laterals[i], axials[i], start + span * size, ratio * sine
+            cosine, sine, value, a2, a2_cosine, a1_sine = (table[column, i] for column in range(6))
+            lateral, axial, r, small = laterals[i], axials[i], start + span * value, ratio * sine
             c_r, c_t = r * cosine, small * r
             d_r, d_t = second_derivative * a2_cosine - radial_rate * a1_sine, small * (second_derivative * a2 + 2.0 * r)
             c0, c1 = axial * c_r + lateral * c_t, axial * c_t - lateral * c_r
             d0, d1 = axial * d_r + lateral * d_t, axial * d_t - lateral * d_r
             cross = c_r * d_t - c_t * d_r
             eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
-            pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
-            # kappa_k = eta + pull_k; eta itself is the depth ratio
+            couplings = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
+            # kappa_k = eta + coupling_k; eta itself is the depth ratio
             # A NaN may be forgotten, which leaves an upper bound: `families.swings.proof.verdicts` decides.
             lowest = nan_ignoring_min(
-                nan_ignoring_min(pulls[0], pulls[1]), nan_ignoring_min(pulls[2], jnp.zeros_like(eta))
+                nan_ignoring_min(couplings[0], couplings[1]), nan_ignoring_min(couplings[2], jnp.zeros_like(eta))
             )
             return nan_ignoring_min(smallest, eta + lowest)
 
-        def several(j):
+        def chunk(j):
             smallest = check(UNROLL * j, jnp.full_like(span, jnp.inf))
             for i in range(1, UNROLL):
                 smallest = check(UNROLL * j + i, smallest)
@@ -97,7 +97,7 @@ def smallest_sampled(
 
         # The minimum is not carried from one sample to the next: XLA leaves on one core what a loop stacks, as the
         # threads of the caller need it.
-        smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
+        smallest = row_by_row(chunk, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 
     return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))

@@ -1,6 +1,6 @@
 """Criteria of a segment as slacks: numbers that are positive exactly while a criterion is met.
 
-At one instant, with kappa_k the normalised pseudotension of cable k (1 at rest in p0) and eta the
+At one time, with kappa_k the normalised pseudotension of cable k (1 at rest in p0) and eta the
 depth below the spools over z0, both along the vertical:
 
     taut               kappa_k        thesis (2.12) to (2.14)
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Num
 
 
-class Instant(NamedTuple):
-    """State of a segment at one instant.
+class SwingState(NamedTuple):
+    """State of a segment at one time.
 
     Fields:
         kappa: normalised pseudotensions, one () a cable.
@@ -46,26 +46,26 @@ class Instant(NamedTuple):
     amplitude_values: tuple[Array, ...]
 
 
-def instant(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]) -> Instant:
-    """State of a segment at one instant, by the closed form."""
+def swing_state(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]) -> SwingState:
+    """State of a segment at one time, by the closed form."""
     values = derivatives(amplitude, tau, order=2)
     c, d = swing(segment, values, arcs, tau)
     cross = c[0] * d[1] - c[1] * d[0]
     eta = 1.0 + segment.tilt[0] * c[0] + segment.tilt[1] * c[1]
-    pulls = [segment.pull[k, 0] * d[0] + segment.pull[k, 1] * d[1] for k in range(segment.pull.shape[0])]
-    kappa = [eta + pull + segment.twist[k] * cross for k, pull in enumerate(pulls)]
-    return Instant(kappa, eta, c, d, values)
+    terms = [segment.coupling[k, 0] * d[0] + segment.coupling[k, 1] * d[1] for k in range(segment.coupling.shape[0])]
+    kappa = [eta + term + segment.twist[k] * cross for k, term in enumerate(terms)]
+    return SwingState(kappa, eta, c, d, values)
 
 
 def normalised_pseudotensions(
     segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
 ) -> Float[Array, "n_cables"]:
-    """Pseudotensions over their value at rest in p0, by the closed form, at one instant."""
-    return jnp.stack(instant(segment, amplitude, arcs, tau).kappa)
+    """Pseudotensions over their value at rest in p0, by the closed form, at one time."""
+    return jnp.stack(swing_state(segment, amplitude, arcs, tau).kappa)
 
 
 def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
-    """Bound of the sum of the sizes of all terms of a normalised pseudotension: the scale of its rounding error."""
+    """Bound of the sum of the magnitudes of all terms of a normalised pseudotension: the scale of its rounding."""
     ratio, steady, period = oscillation(segment, arcs)
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
@@ -74,34 +74,34 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -
     force = (span * largest[2] + second_derivative * radius) / period + gain * (
         span * largest[1] / arcs + 2.0 * ratio * radius
     )
-    pull = jnp.max(jnp.sum(jnp.abs(segment.pull), axis=-1))
+    coupling = jnp.max(jnp.sum(jnp.abs(segment.coupling), axis=-1))
     twist = jnp.max(jnp.abs(segment.twist))
-    return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (pull + radius * twist)
+    return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (coupling + radius * twist)
 
 
-class Stretch(NamedTuple):
+class IntervalBounds(NamedTuple):
     """An interval of tau in which no knot of the amplitude function lies inside, with bounds over it.
 
     Fields:
         middle: () of the interval.
         radius: () half of its width.
-        size: bounds of r, as Bounds.
+        swing_radius: bounds of r, as Bounds.
         radial_rate: bounds of r'.
         second_derivative: bounds of r''.
-        place: (2,) position c in the middle, m.
+        position: (2,) position c in the middle, m.
     """
 
     middle: Array
     radius: Array
-    size: Bounds
+    swing_radius: Bounds
     radial_rate: Bounds
     second_derivative: Bounds
-    place: Array
+    position: Array
 
 
-def stretch(
+def interval_bounds(
     segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], start: Float[Array, ""], stop: Float[Array, ""]
-) -> Stretch:
+) -> IntervalBounds:
     """The interval [start, stop] with bounds of the radius r(tau) of (2.48) over it."""
     middle, radius = 0.5 * (start + stop), 0.5 * (stop - start)
     span = segment.end_radius - segment.start_radius
@@ -109,12 +109,12 @@ def stretch(
     r1, r2, r3, r4 = (jnp.abs(span) * a[j] for j in range(1, 5))
     at_middle = segment.start_radius + span * derivatives(amplitude, middle, order=0)[0]
     r0 = jnp.abs(at_middle) + radius * r1
-    place = instant(segment, amplitude, arcs, middle).c
-    return Stretch(middle, radius, Bounds(r0, r1, r2), Bounds(r1, r2, r3), Bounds(r2, r3, r4), place)
+    position = swing_state(segment, amplitude, arcs, middle).c
+    return IntervalBounds(middle, radius, Bounds(r0, r1, r2), Bounds(r1, r2, r3), Bounds(r2, r3, r4), position)
 
 
-def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds, Bounds]:
-    # Bound vector . e_r and vector . e_t, which turn into each other at the rate of the precession.
+def _components(segment: Segment, vector: Array, over: IntervalBounds) -> tuple[Bounds, Bounds]:
+    # Bound vector . e_r and vector . e_t, which rotate into each other at the rate of the precession.
     lateral, axial = sincospi(segment.sense * segment.precession * over.middle)
     length = hypotenuse(vector[0], vector[1])
     rate = math.pi * segment.precession
@@ -131,12 +131,12 @@ def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds,
 def row_bounds(
     segment: Segment,
     arcs: Num[Array, ""],
-    over: Stretch,
+    over: IntervalBounds,
     tilt: Float[Array, "2"],
-    pull: Float[Array, "2"] | None = None,
+    coupling: Float[Array, "2"] | None = None,
     twist: Float[Array, ""] | None = None,
 ) -> Bounds:
-    """Bounds of tilt . c + pull . d + twist (c x d) over an interval.
+    """Bounds of tilt . c + coupling . d + twist (c x d) over an interval.
 
     In the precessing frame it is X cos Phi + Y sin Phi + E (cos 2 Phi - 1) + F sin 2 Phi with
     Phi = pi p tau, where X, Y, E and F are slow: their bounds, and those of Phi, give the rest.
@@ -144,17 +144,21 @@ def row_bounds(
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
     tilt_r, tilt_t = _components(segment, tilt, over)
-    x, y = tilt_r * over.size, (tilt_t * over.size).times(ratio)
-    if pull is not None:
-        pull_r, pull_t = _components(segment, pull, over)
-        rho = (over.second_derivative + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+    x, y = tilt_r * over.swing_radius, (tilt_t * over.swing_radius).times(ratio)
+    if coupling is not None:
+        pull_r, pull_t = _components(segment, coupling, over)
+        rho = (over.second_derivative + over.swing_radius.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
         x = x + pull_r * rho
-        y = y + (pull_t * (rho + over.size.times(2.0 * gain))).times(ratio)
+        y = y + (pull_t * (rho + over.swing_radius.times(2.0 * gain))).times(ratio)
         y = y + (pull_r * over.radial_rate).times(2.0 * gain / omega)
     total = _oscillating(x, y, omega)
     if twist is not None:
-        e = (over.size * over.radial_rate).times(gain * twist * ratio / omega)
-        total = total + _oscillating(e, (over.size * over.size).times(gain * twist * ratio), 2.0 * omega) + e
+        e = (over.swing_radius * over.radial_rate).times(gain * twist * ratio / omega)
+        total = (
+            total
+            + _oscillating(e, (over.swing_radius * over.swing_radius).times(gain * twist * ratio), 2.0 * omega)
+            + e
+        )
     return total
 
 
@@ -170,12 +174,12 @@ def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
     )
 
 
-def each_taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> list[Bounds]:
+def each_taut_bounds(segment: Segment, arcs: Num[Array, ""], over: IntervalBounds) -> list[Bounds]:
     """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's)."""
-    cables = range(segment.pull.shape[0])
-    return [row_bounds(segment, arcs, over, segment.tilt, segment.pull[k], segment.twist[k]) for k in cables]
+    cables = range(segment.coupling.shape[0])
+    return [row_bounds(segment, arcs, over, segment.tilt, segment.coupling[k], segment.twist[k]) for k in cables]
 
 
-def taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> Bounds:
+def taut_bounds(segment: Segment, arcs: Num[Array, ""], over: IntervalBounds) -> Bounds:
     """The bounds of `each_taut_bounds` in arrays."""
     return jax.tree.map(lambda *bounds: jnp.stack(bounds), *each_taut_bounds(segment, arcs, over))

@@ -40,11 +40,12 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Num
 
 BATCH = 1024
-# Length of the batches of few segments: with limits, for which a whole batch would take several times as long, and of
-# plans, which have up to so many.
-SMALL, OF_PLANS = 128, 16
+# Length of the batches of few segments: with limits, for which a full batch would take several times as long, and of
+# plans.
+SMALL = 128
+OF_PLANS = 16  # segments that plans have, at most
 FINEST_CUT = 12
-# Blocks of a segment in one step of a first look.
+# Blocks of a segment in one step of a first pass.
 TOGETHER = 2
 
 
@@ -53,12 +54,12 @@ class Proof:
     """Proofs of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
 
     Fields:
-        feasible: (n,) every criterion that counts is met at every instant.
-        infeasible: (n,) some criterion that counts is broken at some instant.
-        met: (n, n_criteria) the criterion is met at every instant; False where that is not known.
-        broken: (n, n_criteria) the criterion is broken at some instant; False where that is not known.
-        sampled: (n, n_criteria) smallest slack that a sample of a first look attains.
-        bound: (n, n_criteria) lower bound of the slack that a first look proves.
+        feasible: (n,) every criterion that counts is met at all times.
+        infeasible: (n,) some criterion that counts is broken at some time.
+        met: (n, n_criteria) the criterion is met at all times; False where that is not known.
+        broken: (n, n_criteria) the criterion is broken at some time; False where that is not known.
+        sampled: (n, n_criteria) smallest slack that a sample of a first pass attains.
+        bound: (n, n_criteria) lower bound of the slack that a first pass proves.
     """
 
     feasible: np.ndarray
@@ -70,11 +71,11 @@ class Proof:
 
 
 def tolerance(
-    amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""], least: float = SMALLEST_MARGIN
+    amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""], minimum: float = SMALLEST_MARGIN
 ) -> Float[Array, ""]:
-    """Distance from zero within which a slack is undecided: `least`, and what rounding may be."""
+    """Distance from zero within which a slack is undecided: `minimum`, and what rounding may be."""
     terms = largest_term(amplitude, segment, arcs)
-    return least + 512.0 * jnp.finfo(terms.dtype).eps * terms
+    return minimum + 512.0 * jnp.finfo(terms.dtype).eps * terms
 
 
 def tolerances(problem: Problem, segment: Segment, arcs: Array) -> Array:
@@ -96,12 +97,12 @@ def block_bounds(
 
 
 @persistent_jit
-def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
+def _first_pass(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
     segments, arcs = arguments
-    look = jax.vmap(partial(block_bounds, problem), in_axes=(None, None, 0, 0))
+    bounds_of = jax.vmap(partial(block_bounds, problem), in_axes=(None, None, 0, 0))
 
     def step(state, start, stop):
-        sampled, proved = look(segments, arcs, start, stop)
+        sampled, proved = bounds_of(segments, arcs, start, stop)
         return tuple(map(jnp.minimum, state, smallest_of_each((*sampled, *proved))))
 
     n_criteria = BASIC + len(limits_set(problem.limits))
@@ -112,7 +113,7 @@ def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tup
 
 
 @persistent_jit
-def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
+def _closer_pass(problem: Problem, arguments) -> tuple[Array, Array]:
     sampled, proved = block_bounds(problem, *arguments)
     return jnp.stack(sampled, axis=1), jnp.stack(proved, axis=1)
 
@@ -123,12 +124,12 @@ def prove(
     arcs: Num[np.ndarray, "n"],
     *,
     ignored: Bool[np.ndarray, "n n_criteria"] | None = None,
-    look: tuple[np.ndarray, ...] | None = None,
+    coarse: tuple[np.ndarray, ...] | None = None,
 ) -> Proof:
     """Decide segments, each with a given number of arcs."""
     arcs = np.asarray(arcs, float)
     table = blocks(problem.amplitude, int(arcs.max()))
-    sampled, bound, near = first_look(problem, segments, arcs) if look is None else look
+    sampled, bound, near = first_pass(problem, segments, arcs) if coarse is None else coarse
     counted = ~(np.zeros(sampled.shape, bool) if ignored is None else ignored)
     met, broken = bound > near, ~(sampled >= -near)
     feasible, infeasible = (met | ~counted).all(1), (broken & counted).any(1)
@@ -149,22 +150,22 @@ def length(problem: Problem, count: int, few: int = 0) -> int:
 def is_met_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
 ) -> Bool[np.ndarray, "n n_criteria"]:
-    """Criteria that no sample of a first look breaks."""
+    """Criteria that no sample of a first pass breaks."""
     arcs = np.asarray(arcs, float)
-    sampled, _, near = first_look(problem, segments, arcs)
+    sampled, _, near = first_pass(problem, segments, arcs)
     return sampled >= -near
 
 
-def first_look(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
-    """A first look at segments: smallest samples and proved bounds of all criteria, and their tolerances."""
+def first_pass(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
+    """A first pass over segments: smallest samples and proved bounds of all criteria, and their tolerances."""
     table = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(
-        partial(_first_look, touchable(problem), *table), arguments, batch_size=length(problem, len(arcs), OF_PLANS)
+    result = in_batches(
+        partial(_first_pass, touchable(problem), *table), arguments, batch_size=length(problem, len(arcs), OF_PLANS)
     )
-    return jax.tree.map(lambda x: x[back], look)
+    return jax.tree.map(lambda x: x[back], result)
 
 
 def _cut(
@@ -176,12 +177,12 @@ def _cut(
     broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
     count = counts[arcs.astype(int)]
     owner = np.repeat(np.arange(len(arcs)), count)
-    place = np.concatenate([np.arange(c) for c in count])
+    index = np.concatenate([np.arange(c) for c in count])
     row = arcs.astype(int)[owner]
-    start, stop = edges[row, place], edges[row, place + 1]
+    start, stop = edges[row, index], edges[row, index + 1]
     for _ in range(FINEST_CUT):
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
-        sampled, proved = in_batches(partial(_closer_look, problem), items, batch_size=length(problem, len(owner)))
+        sampled, proved = in_batches(partial(_closer_pass, problem), items, batch_size=length(problem, len(owner)))
         limit = near[owner]
         fails: np.ndarray = ~(sampled >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))

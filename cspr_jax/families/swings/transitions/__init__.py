@@ -6,10 +6,9 @@ Files, each importing only from those above it:
     zero_tension             closed forms for the amplitude function A = tau, sections 1.6 and 1.10
     envelopes                lower envelopes of the pseudotensions of a transition
     envelope_oscillations    numbers of oscillations for which the envelopes stay positive
-    transition_margins       smallest slacks of transitions, from two functions of time
     redundant_inclinations   inclinations that need the fewest oscillations there
-    oscillations             smallest numbers of oscillations of many transitions
+    oscillations             smallest numbers of oscillations of many transitions, and their margins
     transition_leg           transitions in a plan
     oscillations_map         maps of numbers of oscillations
-    envelopes_map            maps of the oscillations that each instant of a transition needs
+    envelopes_map            maps of the oscillations that each time of a transition needs
 """

@@ -31,19 +31,22 @@ if TYPE_CHECKING:
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64
 UNROLL = 4
-# Golden section narrows the bracket to a three-hundredth, parabolas then find the place to rounding.
+# Golden section narrows the bracket to a three-hundredth, parabolas then find the time to rounding.
 STEPS = 12
-PARABOLAS, SMALLEST_SHARE, TINY = 2, 1e-3, 1e-100
+PARABOLAS = 2
+SMALLEST_FRACTION = 1e-3
+TINY = 1e-100
 # Steps of golden section for a best inclination: the bracket ends at 4e-9 of where it began.
 INCLINATION_STEPS = 40
-EPSILONS, SMALLEST_WIDTH = 50, 1e-9
+EPSILONS = 50
+SMALLEST_WIDTH = 1e-9
 LARGEST_INCLINATION = 1.0 - 1e-9
 
 
 def squared_oscillations_at(
     amplitude: Amplitude, weight: Float[Array, ""], inclination: Float[Array, ""], tau: Float[Array, ""]
 ) -> Float[Array, ""]:
-    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at an instant, whatever the phase."""
+    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at one time, whatever the phase."""
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
     return _squared(_root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2)), end)
 
@@ -54,12 +57,12 @@ def _squared(omega: Array, end: Array) -> Array:
 
 
 def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
-    # Return the largest root Omega of the envelope, for A, A', A'' at an instant.
-    size, slope, second_derivative = values
-    c, swung = second_derivative - size * end, inclination * size
+    # Return the largest root Omega of the envelope, for A, A', A'' at one time.
+    value, rate, second_derivative = values
+    c, swung = second_derivative - value * end, inclination * value
     d = (1.0 - swung) * (1.0 + swung)
-    half = swung * load * c - 2.0 * (load * slope) ** 2
-    rest = load**2 * (c**2 + 4.0 * end * slope**2)
+    half = swung * load * c - 2.0 * (load * rate) ** 2
+    rest = load**2 * (c**2 + 4.0 * end * rate**2)
     squared = half**2 + d * rest
     root = jnp.sqrt(jnp.maximum(squared, 0.0))
     # The second form of the root is taken where the first would cancel. Without a real root every Omega keeps the
@@ -90,7 +93,7 @@ def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: 
 
 
 @jax.jit
-def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array) -> Array:
+def _needed(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array) -> Array:
     end = derivatives(amplitude, jnp.ones_like(inclination), order=2)[2]
     values = derivatives(amplitude, tau, order=2)
 
@@ -101,8 +104,8 @@ def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array)
         def at(t):
             return needed(derivatives(amplitude, t, order=2))
 
-        places, highest = _peaks(needed, values)
-        low, high = tau[jnp.maximum(places - 1, 0)], tau[jnp.minimum(places + 1, len(tau) - 1)]
+        indices, highest = _peaks(needed, values)
+        low, high = tau[jnp.maximum(indices - 1, 0)], tau[jnp.minimum(indices + 1, len(tau) - 1)]
         return _squared(jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high))), end)
 
     return jnp.max(jax.vmap(one)(weights))
@@ -114,27 +117,27 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
     none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
     nowhere = jnp.zeros((), jnp.int32)
 
-    def take(peaks, value, place):
+    def take(peaks, value, index):
         (first, at_first), (second, at_second) = peaks
         leads, follows = value > first, value > second
         next_one = jnp.where(leads, first, jnp.where(follows, value, second))
-        at_next = jnp.where(leads, at_first, jnp.where(follows, place, at_second))
-        return (jnp.where(leads, value, first), jnp.where(leads, place, at_first)), (next_one, at_next)
+        at_next = jnp.where(leads, at_first, jnp.where(follows, index, at_second))
+        return (jnp.where(leads, value, first), jnp.where(leads, index, at_first)), (next_one, at_next)
 
     def step(state, point):
-        before, current, place, peaks = state
+        before, current, index, peaks = state
         after = function(point)
         is_peak = (current >= before) & (current >= after)
-        return (current, after, place + 1, take(peaks, jnp.where(is_peak, current, -jnp.inf), place)), None
+        return (current, after, index + 1, take(peaks, jnp.where(is_peak, current, -jnp.inf), index)), None
 
     start = (none, none, nowhere - 1, ((none, nowhere), (none, nowhere)))
-    (before, current, place, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
-    peaks = take(peaks, jnp.where(current >= before, current, -jnp.inf), place)
+    (before, current, index, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
+    peaks = take(peaks, jnp.where(current >= before, current, -jnp.inf), index)
     return jnp.stack([peaks[0][1], peaks[1][1]]), peaks[0][0]
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    # Return the largest value, not negative, near the only peak between two places. Where |v A| comes near to 1 it is
+    # Return the largest value, not negative, near the only peak between two times. Where |v A| comes near to 1 it is
     # sharp, but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
     middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
 
@@ -142,8 +145,8 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
         largest, at, width = state
         points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), low, high)
         values = jax.vmap(function)(points)
-        shares = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_SHARE * jnp.max(values), TINY))
-        move = vertex(shares[0], shares[1], shares[2])[0]
+        reciprocals = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_FRACTION * jnp.max(values), TINY))
+        move = vertex(reciprocals[0], reciprocals[1], reciprocals[2])[0]
         return jnp.maximum(largest, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
 
     return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
@@ -153,7 +156,7 @@ def least_oscillations(
     amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""]
 ) -> Float[Array, ""]:
     """Oscillations that the envelopes ask for, a real number: (1.48), (1.94)."""
-    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
+    return jnp.sqrt(jnp.maximum(_needed(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
 
 
 @jax.jit
@@ -165,7 +168,7 @@ def _extreme(weights: Array) -> Array:
 def horizontal_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
     """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53)."""
     largest = jnp.max(jnp.abs(weights), keepdims=True)
-    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
+    return jnp.sqrt(jnp.maximum(_needed(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
 
 
 def best_inclination(
@@ -178,8 +181,8 @@ def best_inclination(
 @jax.jit
 def _best(amplitude: Amplitude, samples: Array, weights: Array) -> tuple[Array, Array]:
     high = LARGEST_INCLINATION / jnp.maximum(amplitude.largest[0], 1.0).astype(weights.dtype)
-    v = _golden(lambda v: _least(amplitude, samples, weights, v), -high, high, INCLINATION_STEPS)
-    return v, jnp.sqrt(jnp.maximum(_least(amplitude, samples, weights, v), 0.0))
+    v = _golden(lambda v: _needed(amplitude, samples, weights, v), -high, high, INCLINATION_STEPS)
+    return v, jnp.sqrt(jnp.maximum(_needed(amplitude, samples, weights, v), 0.0))
 
 
 def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
@@ -188,10 +191,10 @@ def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
     def needed(epsilon: float) -> float:
         return float(horizontal_oscillations(named("effective", epsilon), weights))
 
-    # A coarse look finds the valley; golden section goes down in it.
+    # A coarse pass finds the valley; golden section goes down in it.
     trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
-    place = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
-    low, high = float(trial[max(place - 1, 0)]), float(trial[min(place + 1, EPSILONS - 1)])
+    index = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
+    low, high = float(trial[max(index - 1, 0)]), float(trial[min(index + 1, EPSILONS - 1)])
     while high - low > SMALLEST_WIDTH:
         left, right = inner_points(low, high)
         low, high = (low, right) if needed(left) <= needed(right) else (left, high)

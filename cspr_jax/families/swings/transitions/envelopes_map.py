@@ -1,4 +1,4 @@
-"""Maps of the oscillations that each instant of a transition needs, and of the envelopes there."""
+"""Maps of the oscillations that each time of a transition needs, and of the envelopes there."""
 
 from functools import partial
 
@@ -22,7 +22,7 @@ _CHECK_ERROR = 1e-7
 
 
 @jax.jit
-def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
+def _at_times(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
     def one(w, v, tau, cable):
         inside = jnp.abs(v) < 1.0
         v = jnp.where(inside, v, 0.0)
@@ -30,11 +30,11 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
         squared = jax.vmap(lambda k: counts.squared_oscillations_at(amplitude, k, v, tau))(w)
         envelope = jax.vmap(lambda k: lower_envelope(amplitude, k, v, n, tau))(w)
         # Cable 0 stands for all of them.
-        place = jnp.maximum(cable - 1, 0)
+        index = jnp.maximum(cable - 1, 0)
         numbers = (
             n,
-            jnp.where(cable > 0, squared[place], jnp.max(squared)),
-            jnp.where(cable > 0, envelope[place], jnp.min(envelope)),
+            jnp.where(cable > 0, squared[index], jnp.max(squared)),
+            jnp.where(cable > 0, envelope[index], jnp.min(envelope)),
         )
         return tuple(jnp.where(inside, value, jnp.nan) for value in numbers)
 
@@ -42,7 +42,7 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
 
 
 class TransitionEnvelopesMap(MinimumOscillationsMap):
-    """Squared oscillations and envelopes of each instant; see `GridMap`."""
+    """Squared oscillations and envelopes at each time; see `GridMap`."""
 
     proves = False
     any_cables = False  # envelopes are of pseudotensions, which the motion must determine
@@ -54,7 +54,7 @@ class TransitionEnvelopesMap(MinimumOscillationsMap):
         segments = transitions_to(self._problem, targets, z0)
         v, w = np.asarray(inclination(segments)), np.asarray(weights(segments))
         cable = np.asarray(cells.get("cable", np.zeros(len(v)))).astype(int)
-        kernel = partial(_instants, self._problem.amplitude)
+        kernel = partial(_at_times, self._problem.amplitude)
         n, squared, envelope = in_batches(kernel, (w, v, cells["tau"], cable), batch_size=BATCH)
         return {
             "least_oscillations": n,

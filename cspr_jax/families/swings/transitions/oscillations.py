@@ -7,6 +7,7 @@ smallest integer that they allow stands beside the smallest that is proved from 
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,25 +17,26 @@ import numpy as np
 from jax import lax
 
 from cspr_jax.families.swings.arcs import check_numbers
-from cspr_jax.families.swings.decide import BATCH, Known, decided, end_slacks
-from cspr_jax.families.swings.hypocycloid import Segment
-from cspr_jax.families.swings.proof.margins import margins
+from cspr_jax.families.swings.decide import BATCH, ProvedArcs, decided, end_slacks
+from cspr_jax.families.swings.hypocycloid import Segment, oscillation
+from cspr_jax.families.swings.proof.blocks import blocks
+from cspr_jax.families.swings.proof.margins import Functions, margins, smallest_values
 from cspr_jax.families.swings.proof.verdicts import tolerance
 from cspr_jax.families.swings.transitions import envelope_oscillations as counts
 from cspr_jax.families.swings.transitions import transition, zero_tension
 from cspr_jax.families.swings.transitions.envelopes import proved_envelope
-from cspr_jax.families.swings.transitions.transition_margins import transition_margins
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.runtime.stages import stage
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
-# Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
+# Samples of the screen; odd, so that they do not fall on the zeros of an oscillation.
 SAMPLES = 61
 ENVELOPE_ERROR = 1e-12
 
@@ -126,16 +128,16 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
     # Bound 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and the depth, which has L = 0.
     high, low, v = loads
     tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    size, slope, second_derivative = derivatives(amplitude, jnp.asarray(tau), order=2)
+    value, rate, second_derivative = derivatives(amplitude, jnp.asarray(tau), order=2)
     end = derivatives(amplitude, jnp.ones(()), order=2)[2]
 
     def one(n):
         omega = 2.0 * jnp.pi * n
         period = omega**2 - end
         cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
-        h = ((second_derivative - size * end) * cosine - 2.0 * omega * slope * sine) / period
+        h = ((second_derivative - value * end) * cosine - 2.0 * omega * rate * sine) / period
         worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
-        lowest = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
+        lowest = jnp.min(1.0 + v[:, None] * value[None] * cosine[None] - worst, axis=1)
         guard = ENVELOPE_ERROR * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
         return jnp.where(period > 0.0, lowest + guard, -jnp.inf)
 
@@ -150,14 +152,14 @@ def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     return jax.vmap(one)(*arguments)
 
 
-def _known(
+def _proved_arcs(
     problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
-) -> Known:
+) -> ProvedArcs:
     # Return the whole numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
     kernel = partial(_proofs, problem.amplitude)
     bound, near = in_batches(kernel, (segments, *of_targets, n), batch_size=BATCH)
-    return Known(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
+    return ProvedArcs(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
 
 
 def minimum_oscillations(
@@ -174,8 +176,8 @@ def minimum_oscillations(
         return _on_more_cables(problem, segments, z0, 2 * largest, arcs)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes
-    look = in_batches(partial(envelopes, problem.amplitude), (weights, v), batch_size=BATCH)
-    real, gain = (np.array(column) for column in look)
+    bounds = in_batches(partial(envelopes, problem.amplitude), (weights, v), batch_size=BATCH)
+    real, gain = (np.array(column) for column in bounds)
     loads = v[:, None] + weights
     extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
     kernel = partial(_upper_bounds, problem.amplitude, largest=largest)
@@ -188,9 +190,11 @@ def minimum_oscillations(
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities = {0: segments, 1: segments}
     is_plain = steady is None and not limits_set(problem.limits) and problem.limits.uncertainty is None
-    known = _known(problem, segments, (weights, v), allowed) if is_plain else None
+    precomputed = _proved_arcs(problem, segments, (weights, v), allowed) if is_plain else None
     measure = transition_margins if steady is None else margins
-    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, known=known, measure=measure)
+    answers, _ = decided(
+        problem, parities, upper, at_ends, infinity, arcs=arcs, precomputed=precomputed, measure=measure
+    )
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,
@@ -230,3 +234,38 @@ def _on_more_cables(
         used_inclination=v,
         used_z0=np.asarray(z0, float),
     )
+
+
+def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segment, arcs: jax.Array, tau: jax.Array):
+    # (1.32) is linear in the load v + w_k: at any time the cables with the extreme loads have the smallest
+    # pseudotensions; load 0 is the depth below the spools.
+    del robot, limits
+    v = transition.inclination(segment)
+    loads = v + transition.weights(segment)
+    _, steady, period = oscillation(segment, arcs)
+    value, rate, second_derivative = derivatives(amplitude, tau, order=2)
+    sine, cosine = sincospi(arcs * tau)
+    # d of `hypocycloid.swing` over the radius; the sense of an even number of arcs is -1.
+    coupling = (
+        second_derivative - value * segment.end_curvature
+    ) / period * cosine - 2.0 * steady / period * rate * sine / (math.pi * arcs)
+    level = 1.0 + v * value * cosine
+    return level - jnp.maximum(jnp.max(loads), 0.0) * coupling, level - jnp.minimum(jnp.min(loads), 0.0) * coupling
+
+
+def transition_margins(
+    problem: Problem, segments: Segment, arcs: Int[np.ndarray, "n"]
+) -> Float[np.ndarray, "n n_criteria"]:
+    """Smallest slack of each criterion along each transition, as `margins` gives them, from two functions of time.
+
+    Where both are positive, the slack of the cables stands in both of the first two columns.
+    """
+    if limits_set(problem.limits):
+        return margins(problem, segments, arcs)
+    table = blocks(problem.amplitude, int(np.max(arcs)))
+    smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), problem, segments, arcs, table).min(1)
+    slacks = np.stack([smallest, smallest], axis=1)
+    unclear = np.flatnonzero(~(np.isfinite(smallest) & (smallest > 0.0)))
+    if len(unclear):
+        slacks[unclear] = margins(problem, jax.tree.map(lambda array: array[unclear], segments), arcs[unclear])
+    return slacks

@@ -23,9 +23,9 @@ class MinimumOscillationsMap(PointMassMap):
     proves = True
     any_cables = True
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Build what all tiles share; an amplitude function for bounds is allowed where tensions have envelopes."""
-        super().__init__(robot_file, keys, file, for_bounds=len(robot_file.base_points) == robot_file.dof)
+        super().__init__(robot_file, sweep_file, file, for_bounds=len(robot_file.base_points) == robot_file.dof)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -27,8 +27,9 @@ from cspr_jax.runtime.stages import stage
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Inclinations of a first look, of each finer one, and how many of these follow.
-TRIED, FINER, ROUNDS = 41, 9, 3
+TRIED = 41  # inclinations of the first grid
+FINER = 9  # of each finer one
+ROUNDS = 3  # of finer grids
 Transitions = Callable[[Problem, np.ndarray, np.ndarray], Segment]
 
 
@@ -46,8 +47,8 @@ def redundant_inclinations(
         stage(f"inclinations for {arcs // 2} oscillations")
         slack = partial(_slacks, problem, transitions, targets[rows], arcs)
         # The ends belong to no transition.
-        shares, step = np.linspace(-1.0, 1.0, TRIED + 2)[1:-1], 2.0 * largest / (TRIED + 1)
-        tried = np.tile(largest * shares, (len(rows), 1))
+        fractions, step = np.linspace(-1.0, 1.0, TRIED + 2)[1:-1], 2.0 * largest / (TRIED + 1)
+        tried = np.tile(largest * fractions, (len(rows), 1))
         slacks = slack(tried, FEW)
         for _ in range(ROUNDS):
             v = _at(tried, slacks.argmax(1))
@@ -73,8 +74,10 @@ def _slacks(
     samples: int,
 ) -> np.ndarray:
     # Return the smallest slack of the transition to each of n targets with each of m inclinations, (n, m).
-    places = np.repeat(targets, inclinations.shape[1], axis=0)
+    positions = np.repeat(targets, inclinations.shape[1], axis=0)
     kernel = jax.vmap(partial(depth_for, problem.robot))
-    segments = transitions(problem, places, np.asarray(kernel(jnp.asarray(places), jnp.asarray(inclinations.ravel()))))
-    minimum = least_slacks(problem, segments, np.arange(len(places)), arcs, samples)
+    segments = transitions(
+        problem, positions, np.asarray(kernel(jnp.asarray(positions), jnp.asarray(inclinations.ravel())))
+    )
+    minimum = least_slacks(problem, segments, np.arange(len(positions)), arcs, samples)
     return minimum.min(1).reshape(inclinations.shape)

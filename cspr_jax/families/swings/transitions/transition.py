@@ -51,7 +51,7 @@ def inclination(segment: Segment) -> Float[Array, "..."]:
 @jax.jit
 def weights(segment: Segment) -> Float[Array, "... n_cables"]:
     """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots."""
-    load = -segment.end_radius[..., None] * segment.pull[..., 0]
+    load = -segment.end_radius[..., None] * segment.coupling[..., 0]
     return load - inclination(segment)[..., None]
 
 

@@ -2,7 +2,7 @@
 
 It is no motion, since it breaks (1.27) and (1.28). On horizontal transitions it spreads the load evenly over
 the time, so that it bounds the others; on inclined ones it is a guide. w_hi and w_lo are the largest and the
-smallest weight, w_C the one that is larger in size.
+smallest weight, w_C the one of larger magnitude.
 """
 
 from __future__ import annotations
@@ -30,6 +30,6 @@ def best_inclination(weights: Float[Array, "n_cables"]) -> tuple[Float[Array, ""
     """
     high, low = jnp.max(weights), jnp.min(weights)
     largest = jnp.where(high >= -low, high, low)
-    size = jnp.minimum(0.5 * jnp.abs(high + low), 1.0 / jnp.abs(largest))
-    v = -jnp.sign(largest) * size
+    magnitude = jnp.minimum(0.5 * jnp.abs(high + low), 1.0 / jnp.abs(largest))
+    v = -jnp.sign(largest) * magnitude
     return v, least_oscillations(weights, v)
