@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 BATCH = 4096
 # Candidates whose margins differ by less are equally good; the first of them is reported.
 TIE = 1e-9
-# Of the second, denser screen; samples are multiples of 4.
+# The second, denser screen; samples are multiples of 4.
 SAMPLES_PER_ARC = 32
 MAX_SAMPLES = 1024
 DENSE_BATCH = 512  # segments at a time: few need it
