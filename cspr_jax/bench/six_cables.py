@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128
-FEWEST_ARCS, MOST_ARCS = 4, 15
+FEWEST_ARCS, MAX_ARCS = 4, 15
 TARGET = (1.5 * 0.86, 0.0, 1.7)
 FROM_REST, QUINTIC = PlatformMotionKind(from_rest=True), amplitudes.named("quintic")
 
@@ -60,7 +60,7 @@ def work(count: int) -> SixCableWork:
     rng = np.random.default_rng(0)
     axis = rng.normal(size=(3, count))
     axis /= np.linalg.norm(axis, axis=0)
-    angle, arcs = rng.uniform(0.0, 2.0, count), rng.integers(FEWEST_ARCS, MOST_ARCS + 1, count)
+    angle, arcs = rng.uniform(0.0, 2.0, count), rng.integers(FEWEST_ARCS, MAX_ARCS + 1, count)
     robot = load_robot("laval-mssm")
     return SixCableWork(aligned(robot)[0], axis.T, angle, arcs, rng.uniform(-15.0, 0.0, count))
 

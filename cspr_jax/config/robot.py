@@ -11,7 +11,7 @@ from cspr_jax.config.catalogue import catalogue_names as catalogue_names
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
 from cspr_jax.config.keys.limits import (
     LARGEST_LENGTH,
-    MOST_CABLES,
+    MAX_CABLES,
     LimitKeys,
     MatrixRow,
     NotNegativePerCable,
@@ -41,11 +41,11 @@ class RobotFile(LimitKeys):
     """A robot of one effector: a point mass on cables, or a platform; other kinds of effectors need `pattern`."""
 
     name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
-    base_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] = Field(
+    base_points: Annotated[list[Point], Field(max_length=MAX_CABLES)] = Field(
         description="points where the cables leave their spools, or enter their pulleys, [x, y, z] in cable order, m; "
         "as many as degrees of freedom, or more; with y = 0 if planar"
     )
-    platform_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] | None = Field(
+    platform_points: Annotated[list[Point], Field(max_length=MAX_CABLES)] | None = Field(
         None, description="platform: points where the cables are attached, one per cable, platform axes, m"
     )
     inertia: Annotated[list[MatrixRow], Field(min_length=3, max_length=3)] | None = Field(

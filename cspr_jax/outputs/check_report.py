@@ -18,7 +18,7 @@ from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers
 
 SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.
-MOST_INTERVALS = 12
+MAX_INTERVALS = 12
 
 # Details of a motion that was run along again.
 RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_deviation")
@@ -140,8 +140,8 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     lines += [f"{word}: {cause.text}" for cause in plan.causes[0]]
     intervals = case.failing
     digits = max(6, 3 - math.floor(math.log10(float(answers.duration[0]))))
-    named = ", ".join(f"{start:.{digits}f} to {end:.{digits}f} s" for start, end in intervals[:MOST_INTERVALS])
-    more = f", and {len(intervals) - MOST_INTERVALS} more" if len(intervals) > MOST_INTERVALS else ""
+    named = ", ".join(f"{start:.{digits}f} to {end:.{digits}f} s" for start, end in intervals[:MAX_INTERVALS])
+    more = f", and {len(intervals) - MAX_INTERVALS} more" if len(intervals) > MAX_INTERVALS else ""
     return [*lines, f"it fails from {named}{more}"] if len(intervals) else lines
 
 

@@ -21,7 +21,7 @@ from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 # Fraction of its scale within which the smallest slack of a criterion is compared with what samples leave open.
 NEAR = 1e-3
 # Samples in each piece, and pieces at most, at which motions are compared.
-SAMPLES, MOST_PIECES = 8, 256
+SAMPLES, MAX_PIECES = 8, 256
 
 
 class TouchedLimit(NamedTuple):
@@ -85,6 +85,6 @@ def _sample_times(knots: np.ndarray, failing: np.ndarray, when: float) -> np.nda
     first, last = (np.searchsorted(knots, side) for side in spans.T)
     pieces = np.unique(np.concatenate([np.arange(i - 2, j + 2) for i, j in zip(first, last, strict=True)]))
     pieces = pieces[(pieces >= 0) & (pieces < len(knots) - 1)]
-    pieces = pieces[np.unique(np.linspace(0, len(pieces) - 1, MOST_PIECES).astype(int))]
+    pieces = pieces[np.unique(np.linspace(0, len(pieces) - 1, MAX_PIECES).astype(int))]
     fractions = (np.arange(SAMPLES) + 0.5) / SAMPLES
     return (knots[pieces, None] + np.diff(knots)[pieces, None] * fractions).ravel() / knots[-1]

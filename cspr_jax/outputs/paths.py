@@ -8,7 +8,7 @@ from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # Limits that a line names, at most; smaller fractions of the time than this it leaves out.
-MOST_NAMED, LEAST_NAMED = 4, 0.005
+MAX_NAMED, MIN_NAMED = 4, 0.005
 
 
 def path_lines(segments: list[dict[str, Any]]) -> list[str]:
@@ -27,8 +27,8 @@ def path_lines(segments: list[dict[str, Any]]) -> list[str]:
 def _binding(rows: list[dict[str, Any]]) -> str:
     texts = [
         f"{row['words']} ({_percent(row['share'])})"
-        for row in rows[:MOST_NAMED]
-        if row["share"] >= LEAST_NAMED or row is rows[0]
+        for row in rows[:MAX_NAMED]
+        if row["share"] >= MIN_NAMED or row is rows[0]
     ]
     return ", ".join(texts).replace(")", " of the time)", 1)
 

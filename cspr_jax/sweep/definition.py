@@ -32,7 +32,7 @@ LARGEST_RESULT = 1 << 46  # bytes; the free room on the disk is looked at when a
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 # Maps of fewer cells are done before a GPU has compiled its code; those whose cells cost more seconds are searches and
 # proofs in many short steps, for each of which a GPU has to start (docs/performance.md, GPU).
-LEAST_FOR_GPU, MOST_SECONDS_FOR_GPU = 100_000, 1e-3
+MIN_FOR_GPU, MAX_SECONDS_FOR_GPU = 100_000, 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,8 +74,8 @@ class Sweep:
     @property
     def prefers_cpu(self) -> bool:
         """Tell whether a GPU would take longer."""
-        is_stepwise = self.kind.by_processes or self.kind.cost.seconds > MOST_SECONDS_FOR_GPU
-        return is_stepwise or self.grid.n_cells < LEAST_FOR_GPU
+        is_stepwise = self.kind.by_processes or self.kind.cost.seconds > MAX_SECONDS_FOR_GPU
+        return is_stepwise or self.grid.n_cells < MIN_FOR_GPU
 
     @functools.cached_property
     def layout(self) -> Layout:

@@ -11,7 +11,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.workspaces.acceleration_search import reach_of
 
-MOST_CABLES = 20
+MAX_CABLES = 20
 
 
 class FeasibleAccelerationMap(PointMassMap):
@@ -22,9 +22,9 @@ class FeasibleAccelerationMap(PointMassMap):
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse robots on so many cables that the corners of their faces need too much memory."""
         super().__init__(robot_file, spec, file)
-        if self._problem.robot.n_cables > MOST_CABLES:
+        if self._problem.robot.n_cables > MAX_CABLES:
             source, key = robot_file.placed("base_points", file)
-            raise ConfigError(source, f"{key}: must be at most {MOST_CABLES} in this map")
+            raise ConfigError(source, f"{key}: must be at most {MAX_CABLES} in this map")
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -19,7 +19,7 @@ from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
 # Largest number of choices of dof - 1 cables: with so many a pose takes seconds, and as many megabytes.
-MOST_CHOICES = 100_000
+MAX_CHOICES = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Requirement:
 
 def check_cables(robot: AnyRobot) -> None:
     """Refuse robots with too many cables: the number of choices of cables grows with a power of it."""
-    if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
-        maximum = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
+    if math.comb(robot.n_cables, robot.dof - 1) > MAX_CHOICES:
+        maximum = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MAX_CHOICES)
         allowed = f"at most {maximum} for workspaces of {robot.dof} degrees of freedom"
         raise InputError("robot", None, f"must have {allowed}", problem=f"{robot.n_cables} cables")
 

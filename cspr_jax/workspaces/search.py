@@ -37,7 +37,7 @@ SINGLE_ERROR = 1e-3
 PART = 1 << 18
 # Poses of a batch where poses are few, and where a search is prepared.
 BATCH = 1024
-MOST_SHORT = 8  # short batches
+MAX_SHORT = 8  # short batches
 # Bytes of the wrench matrices of a batch where poses are many: large beside the start of a call, and small enough for
 # caches to hold most of them.
 BYTES = 6_400_000
@@ -119,7 +119,7 @@ class WorkspaceSearch:
         matrices = self._trials()
         self._choices = facet_normals.choices_of(matrices[:FEW_TRIALS])
         self._order = tuple[int, ...]()
-        is_few = 0 <= robot.n_cables - facet_normals.CABLES <= facet_normals.MOST_OTHERS
+        is_few = 0 <= robot.n_cables - facet_normals.CABLES <= facet_normals.MAX_OTHERS
         if robot.dof == facet_normals.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
             self._order = facet_normals.base_order(matrices)
 
@@ -251,7 +251,7 @@ class WorkspaceSearch:
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), quaternions, loads
             # Use two lengths only, since each is compiled.
-            length = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
+            length = BATCH if len(poses.positions) <= MAX_SHORT * BATCH else self.batch(dtype)
             return in_batches(lambda x: compiled(*x), batch, batch_size=length)
 
         return stage

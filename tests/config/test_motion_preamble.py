@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cspr_jax.config.motions import text
-from cspr_jax.config.motions.preamble import LARGEST_COMMENTS, MOST_COLUMNS, Preamble
+from cspr_jax.config.motions.preamble import LARGEST_COMMENTS, MAX_COLUMNS, Preamble
 from cspr_jax.errors import ConfigError
 
 ROWS = "0,1,2,3\n1,2,3,5\n2,4,4,6\n"
@@ -102,8 +102,8 @@ def test_units_above_the_rows(tmp_path, content):
         ("a,b,c,d\n" + ROWS, 'found "a", "b", "c", "d", which would have to be called t, x, y, z'),
         ("t [s],L1 [m],L2 [m],L3 [m]\n" + ROWS, "line 1: no column x: must have x, y, z"),
         ("t [ms],x,y,z\ns,m,m,m\n" + ROWS, 'units "ms" and "s": must be one'),
-        (",".join("t" * (MOST_COLUMNS + 1)) + "\n", f"line 1: {MOST_COLUMNS + 1} columns: must be at most"),
-        (",".join("1" * (MOST_COLUMNS + 1)) + "\n", f"line 1: {MOST_COLUMNS + 1} columns: must be at most"),
+        (",".join("t" * (MAX_COLUMNS + 1)) + "\n", f"line 1: {MAX_COLUMNS + 1} columns: must be at most"),
+        (",".join("1" * (MAX_COLUMNS + 1)) + "\n", f"line 1: {MAX_COLUMNS + 1} columns: must be at most"),
         ("# of nothing\n" * (LARGEST_COMMENTS // 11) + ROWS, "letters of comments: must be above fewer"),
     ],
 )

@@ -232,7 +232,7 @@ def test_windows_tile_the_table(tmp_path, monkeypatch, count):
         assert part.first in (0, text.OVERLAP) and part.last < len(part.table.times)
         if not part.is_last:
             assert len(part.table.times) - 1 - part.last == text.OVERLAP and part.last - part.first == 200
-    monkeypatch.setattr(text, "MOST_ROWS", 300)
+    monkeypatch.setattr(text, "MAX_ROWS", 300)
     if count > 402:
         with pytest.raises(ConfigError, match="more than 300 rows"):
             text.read(path)

@@ -24,7 +24,7 @@ def table(tmp_path, monkeypatch):
     np.savetxt(path, np.column_stack([times, places]), fmt="%.17g", delimiter=",", header="t,x,y,z", comments="")
     (tmp_path / "limits.toml").write_text("cable_speed_max = 0.015\n")
     whole = cspr_jax.check("prototype", path, limits=LIMITS)
-    monkeypatch.setattr(text, "MOST_ROWS", 500)
+    monkeypatch.setattr(text, "MAX_ROWS", 500)
     monkeypatch.setattr(long_motions, "motion_windows", lambda path: motion_samples.motion_windows(path, 400))
     return path, whole
 

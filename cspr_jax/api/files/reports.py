@@ -21,7 +21,7 @@ from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.paths import path_columns
 from cspr_jax.outputs.plots.motions.motion_source import completed, keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.pages.maps import informative_cells, map_content, order_of
-from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
+from cspr_jax.outputs.plots.pages.motions import MAX_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
 from cspr_jax.outputs.plots.pages.solids import solids_content
 from cspr_jax.outputs.plots.selection import is_own_motion, nearest, result_at
@@ -153,7 +153,7 @@ def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
         # Motions of about one length have as many rows, so that they share compiled code.
-        rate = STEP * np.ceil(min(RATE * length, MOST_ROWS) / STEP) / length
+        rate = STEP * np.ceil(min(RATE * length, MAX_ROWS) / STEP) / length
         columns = motion_files.rows(planned, rate=float(rate))
         columns |= planned.outcome_columns | motion_files.failures(planned) | path_columns(planned)
         return motion_content(title, columns, motion_files.segments(planned), planned.robot_file, planned.keys)

@@ -22,7 +22,7 @@ from cspr_jax.errors.suggestions import look_alike
 # By numbers of rotations and translations.
 PATTERNS = {(0, 1): "1T", (0, 2): "2T", (0, 3): "3T", (1, 2): "1R2T", (2, 3): "2R3T", (3, 3): "3R3T"}
 AXES = {"1T": model.OF_X, "2T": model.OF_XY, "1R2T": model.OF_XY}
-MOST_CABLES = 1000
+MAX_CABLES = 1000
 LARGEST = 1_000_000  # values of a file
 
 
@@ -98,8 +98,8 @@ class _Table:
 
     def tables(self, key: str) -> list["_Table"]:
         tables = self._required(key)
-        if not isinstance(tables, list) or not 1 <= len(tables) <= MOST_CABLES:
-            raise ConfigError(self.file, f"{self.prefix}{key}: must be a list of 1 to {MOST_CABLES} tables")
+        if not isinstance(tables, list) or not 1 <= len(tables) <= MAX_CABLES:
+            raise ConfigError(self.file, f"{self.prefix}{key}: must be a list of 1 to {MAX_CABLES} tables")
         return [_Table(one, f"{self.prefix}{key}[{k}]", self.file) for k, one in enumerate(tables)]
 
     def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:

@@ -6,10 +6,10 @@ import yaml
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # Robots have at most 1000 cables; Python's own loader takes some 100 us for an event, libyaml's some 5 us.
-MOST_EVENTS = 300_000 if hasattr(yaml, "CSafeLoader") else 20_000
+MAX_EVENTS = 300_000 if hasattr(yaml, "CSafeLoader") else 20_000
 DEEPEST = 100
 LONGEST_SCALAR = 10_000  # characters: base 60 makes integers of them in a time that grows with the square
-MOST_ODD_KEYS = 1000  # that are no words: numbers can be chosen so that all collide in a table
+MAX_ODD_KEYS = 1000  # that are no words: numbers can be chosen so that all collide in a table
 _WORD = "tag:yaml.org,2002:str"
 
 
@@ -23,7 +23,7 @@ class _Loader(_Base):
         super().flatten_mapping(node)
         self.pairs += len(node.value)
         odd = sum(key.tag != _WORD for key, _ in node.value)
-        if self.pairs > MOST_EVENTS or odd > MOST_ODD_KEYS:
+        if self.pairs > MAX_EVENTS or odd > MAX_ODD_KEYS:
             raise yaml.YAMLError("its mappings have too many keys")
 
 
@@ -45,7 +45,7 @@ def _check_events(text: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - is_end
         if depth > DEEPEST:
             raise RecursionError
-        if count > MOST_EVENTS:
-            raise yaml.YAMLError(f"it has more than {MOST_EVENTS} parts")
+        if count > MAX_EVENTS:
+            raise yaml.YAMLError(f"it has more than {MAX_EVENTS} parts")
         if isinstance(event, yaml.ScalarEvent) and len(event.value) > LONGEST_SCALAR:
             raise yaml.YAMLError(f"a value of {len(event.value)} characters: must be at most {LONGEST_SCALAR}")

@@ -20,7 +20,7 @@ _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)
 _PLANES = {17: (2, "XY", "IJ"), 18: (1, "ZX", "KI"), 19: (0, "YZ", "JK")}
 MINUTE = 60.0  # s
 # Words that a line names at most, and decimals that count at most.
-MOST_NAMED, MOST_DECIMALS = 12, 12
+MAX_NAMED, MAX_DECIMALS = 12, 12
 
 
 class Move(NamedTuple):
@@ -75,7 +75,7 @@ def read_program(path: Path, start: list[float] | None = None) -> GcodeProgram:
 
 def _decimals(text: str) -> int:
     # Zeros at the end may be left out: the most that a length has are those that all have.
-    return min(max(map(len, _DECIMALS.findall(text)), default=0), MOST_DECIMALS)
+    return min(max(map(len, _DECIMALS.findall(text)), default=0), MAX_DECIMALS)
 
 
 class _GcodeReader:
@@ -122,9 +122,9 @@ class _GcodeReader:
         if self.skipped:
             names = [
                 name if count == 1 else f"{name} ({count:,} times)"
-                for name, count in self.skipped.most_common(MOST_NAMED)
+                for name, count in self.skipped.most_common(MAX_NAMED)
             ]
-            names += [f"{len(self.skipped) - MOST_NAMED} others"] if len(self.skipped) > MOST_NAMED else []
+            names += [f"{len(self.skipped) - MAX_NAMED} others"] if len(self.skipped) > MAX_NAMED else []
             total = sum(self.skipped.values())
             lines.append(f"{self.path.name}: {total:,} words that change no path are skipped: {', '.join(names)}")
         if self.paused:

@@ -23,7 +23,7 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.model.point_mass`,
 # with jax.
 LARGEST_LENGTH = 1e6
-MOST_CABLES = 1000
+MAX_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 MatrixRow = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
@@ -75,7 +75,7 @@ def _variant_of_vectors(value: Any) -> str:
 
 
 def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
-    many = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
+    many = Annotated[list[each], Field(min_length=1, max_length=MAX_CABLES), Tag("~each")]
     return Annotated[Annotated[one, Tag("~one")] | many, Discriminator(variant)]
 
 

@@ -13,14 +13,14 @@ from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.robots.model import shapes
 
-MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
+MAX_OBSTACLES, MAX_CORNERS = 1000, 1000
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
 Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH), NotTiny]
 EdgeLengths = Annotated[list[Extent], Field(min_length=3, max_length=3)]
 Component = Annotated[float, Field(ge=-1.1, le=1.1)]
 Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
 Corners = Annotated[list[Point], Field(min_length=2, max_length=2)]
-Points = Annotated[list[Point], Field(min_length=4, max_length=MOST_CORNERS)]
+Points = Annotated[list[Point], Field(min_length=4, max_length=MAX_CORNERS)]
 HullOf = Annotated[
     Annotated[bool, Tag("~true")] | Annotated[Points, Tag("~points")],
     Discriminator(lambda value: "~points" if isinstance(value, list) else "~true"),
@@ -93,7 +93,7 @@ class ObstacleTable(Table):
         return shapes.box(self.centre, self.size, self.quaternion or IDENTITY, name=name)
 
 
-Obstacles = Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)]
+Obstacles = Annotated[list[ObstacleTable], Field(max_length=MAX_OBSTACLES)]
 
 
 class PlatformShapeKeys(Table):

@@ -35,7 +35,7 @@ GRID, RAMP_TIME = 500, 0.1
 SAME_PLACE = 1e-9
 # Number of cells of a grid in maps, where many paths are asked.
 MAP_GRID = 200
-MOST_POINTS = 100_000
+MAX_POINTS = 100_000
 GridSize = Annotated[int, Field(ge=2, le=LARGEST_GRID)]
 
 
@@ -48,7 +48,7 @@ class PathTable(Table):
         '"cubic" (C2) or "quintic" (C4), a spline through the points; "arc"; "circle"; "csv", a file of points; '
         '"gcode", a file of G-code',
     )
-    points: Annotated[list[Point], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
+    points: Annotated[list[Point], Field(min_length=1, max_length=MAX_POINTS)] | None = Field(
         None,
         description="points [x, y, z], m: of a plan all of them, of a pose those between the pose before and this one",
     )
@@ -66,7 +66,7 @@ class PathTable(Table):
         "of the robot file, of a planar robot y",
     )
     angle: Angle | None = Field(None, description="arc: by which it turns, rad; negative: the other way")
-    orientations: Annotated[list[Quaternion], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
+    orientations: Annotated[list[Quaternion], Field(min_length=1, max_length=MAX_POINTS)] | None = Field(
         None,
         description="platforms: unit quaternions [w, x, y, z], one for each point (arc, circle: for start and end), or "
         "one for all; absent: those of the poses, else the reference orientation",

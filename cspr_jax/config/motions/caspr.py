@@ -23,9 +23,9 @@ from cspr_jax.errors.suggestions import did_you_mean
 
 ENDING = "_trajectories.xml"
 TURN_ERROR = 1e-11  # of the components of quaternions
-MOST_PARTS = 1024  # of a piece
-MOST_PIECES = 100_000  # of a trajectory
-MOST_TURNS = 300  # of a coordinate
+MAX_PARTS = 1024  # of a piece
+MAX_PIECES = 100_000  # of a trajectory
+MAX_TURNS = 300  # of a coordinate
 LONGEST_LINE = 600  # letters
 _AVERAGE, _BLEND = "cubic_spline_average_velocity_trajectory", "parabolic_blend_trajectory"
 # Tags of the derivatives that each point of a kind has.
@@ -156,11 +156,11 @@ def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path:
 
 
 def _check_turns(angles: np.ndarray, path: Path, name: str) -> None:
-    largest = 2.0 * math.pi * MOST_TURNS
+    largest = 2.0 * math.pi * MAX_TURNS
     far = np.flatnonzero((np.abs(angles) > largest).any(axis=1))
     if len(far):
         angle = float(np.abs(angles[far[0]]).max())
-        allowed = f"at most {MOST_TURNS} turns, {largest:.6g} rad"
+        allowed = f"at most {MAX_TURNS} turns, {largest:.6g} rad"
         raise ConfigError(path, f"{name}, point {far[0] + 1}.q: an angle of {angle:g} rad: must be {allowed}")
 
 
@@ -228,8 +228,8 @@ def _rotating_pieces(
         if error <= TURN_ERROR:
             break
         parts *= 2
-        if parts > MOST_PARTS or parts * len(table) > MOST_PIECES:
-            allowed = f"must turn by less from point to point, so that {MOST_PIECES} polynomial pieces are enough"
+        if parts > MAX_PARTS or parts * len(table) > MAX_PIECES:
+            allowed = f"must turn by less from point to point, so that {MAX_PIECES} polynomial pieces are enough"
             raise InputError("points", None, allowed, problem=f"{len(values)} of them")
     before = np.repeat(start.as_quat(scalar_first=True), parts, axis=0)[:, None]
     fine = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(parts) / parts).ravel()

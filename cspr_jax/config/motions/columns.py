@@ -55,8 +55,8 @@ _VALUES = {
     "z": Z_AXES,
 }
 DIRECTIVES = (*_VALUES, "units")
-MOST_LISTED = 24  # columns in a message
-MOST_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
+MAX_LISTED = 24  # columns in a message
+MAX_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
 
 
 def plain_names(count: int, has_times: bool) -> tuple[str, ...]:
@@ -196,12 +196,12 @@ def _unread(heads: list[str], names: list[str]) -> list[str]:
         head for head, name in zip(heads, names, strict=True) if not name and head and not _BESIDE.fullmatch(head)
     ]
     lines = []
-    for k, head in enumerate(unread[:MOST_SUGGESTIONS]):
+    for k, head in enumerate(unread[:MAX_SUGGESTIONS]):
         near = nearest(head.partition("[")[0].strip().lower(), [other for other in NAMES if other not in names])
         question = f"did you mean {near}? " if near else ""
         names_read = f"known: {', '.join(NAMES)}" if not k else "known: as above"
         lines.append(f"column {shown(head)} is not read: {question}{names_read}")
-    more = len(unread) - MOST_SUGGESTIONS
+    more = len(unread) - MAX_SUGGESTIONS
     return lines + ([f"{more} more column{'s are' if more > 1 else ' is'} not read"] if more > 0 else [])
 
 
@@ -279,5 +279,5 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
 
 def _listed(heads: tuple[str, ...]) -> str:
     # All columns that were found, as far as a line has space.
-    words = ", ".join(shown(head) for head in heads[:MOST_LISTED])
-    return words + (f" and {len(heads) - MOST_LISTED} more" if len(heads) > MOST_LISTED else "")
+    words = ", ".join(shown(head) for head in heads[:MAX_LISTED])
+    return words + (f" and {len(heads) - MAX_LISTED} more" if len(heads) > MAX_LISTED else "")

@@ -15,9 +15,9 @@ from cspr_jax.errors import ConfigError, shown
 
 COMMENT_SIGNS = ("#", "%")
 SEPARATORS = (";", "\t", ",")
-MOST_COLUMNS = 1000
+MAX_COLUMNS = 1000
 LARGEST_COMMENTS = 1 << 18  # letters of comments above the rows
-MOST_HINTS = 3  # lines about comments
+MAX_HINTS = 3  # lines about comments
 LONGEST_COMMENT = 1 << 16  # letters of one that may name columns
 _SEPARATOR_LINE = re.compile(r"\"?sep=(.)\"?[,;\t ]*", re.IGNORECASE)
 # A word and the unit in brackets behind it, or a unit alone.
@@ -130,8 +130,8 @@ class Preamble:
         else:
             self.tail = empty
         count = len(cells) - self.tail if heads is None else len(heads)
-        if count > MOST_COLUMNS:
-            raise ConfigError(self.path, f"line {line}: {count} columns: must be at most {MOST_COLUMNS}")
+        if count > MAX_COLUMNS:
+            raise ConfigError(self.path, f"line {line}: {count} columns: must be at most {MAX_COLUMNS}")
         named, names_line = line, heads
         if heads is None:
             named, names_line = self._named_by_comment(count)
@@ -187,7 +187,7 @@ class Preamble:
             f"line {line}: hint: a comment speaks of {', '.join(dict.fromkeys(names))}: {shown(text)}"
             for line, text, names in spoken
             if names and is_unnamed
-        ][:MOST_HINTS]
+        ][:MAX_HINTS]
         if (
             has_units
             or "units" in self.directives
@@ -203,7 +203,7 @@ class Preamble:
                     f"line {line}: a comment speaks of {units[0]}, {shown(text)}: must say units as # units: "
                     f"{', '.join(dict.fromkeys(units))}, or behind names, as x [{units[0]}]",
                 )
-            if units and (is_bare or is_about) and len(notes) < MOST_HINTS:
+            if units and (is_bare or is_about) and len(notes) < MAX_HINTS:
                 notes.append(
                     f"line {line}: hint: a comment speaks of {units[0]}, but columns are taken in s, m and rad"
                 )

@@ -26,7 +26,7 @@ from cspr_jax.errors.suggestions import look_alike
 
 BLOCK = 4 << 20  # bytes that are read at a time
 LARGEST_LINE = 1 << 16
-MOST_ROWS = 1_000_000  # of a table that is read as a whole
+MAX_ROWS = 1_000_000  # of a table that is read as a whole
 WINDOW = 200_000  # rows
 # Rows of the neighbours that a window has besides. In a spline an end counts by 0.27 (cubic) or 0.43 (quintic) a row.
 OVERLAP = 100
@@ -62,9 +62,9 @@ class MotionWindow:
 
 def read(path: Path, *, has_times: bool = True) -> MotionTable:
     """A table of a motion, or of the points of a path, as a whole."""
-    window = next(windows(path, MOST_ROWS, has_times=has_times))
+    window = next(windows(path, MAX_ROWS, has_times=has_times))
     if not window.is_last:
-        raise TooLongError(path, f"more than {MOST_ROWS} rows: must be fewer where a motion is read as a whole")
+        raise TooLongError(path, f"more than {MAX_ROWS} rows: must be fewer where a motion is read as a whole")
     return window.table
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.config.keys.limits import MOST_CABLES
+from cspr_jax.config.keys.limits import MAX_CABLES
 from cspr_jax.errors import printable, shown
 from cspr_jax.schema.quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.files.checksum import DamagedError, unreadable
@@ -114,7 +114,7 @@ def _column_indices(heads: list[str]) -> dict[str, Any]:
     indices: dict[str, Any] = {}
     start = 0
     for name in TRAJECTORY:
-        parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MOST_CABLES))) if name in ACROSS else ()
+        parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MAX_CABLES))) if name in ACROSS else ()
         columns = [f"{name}_{part}" for part in parts] or [name]
         count = next((k for k, head in enumerate(names[start:]) if k == len(columns) or head != columns[k]), None)
         count = len(names) - start if count is None else count

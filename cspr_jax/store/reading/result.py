@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cspr_jax.config.keys.limits import LARGEST_LENGTH, MOST_CABLES
+from cspr_jax.config.keys.limits import LARGEST_LENGTH, MAX_CABLES
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
@@ -239,7 +239,7 @@ def _motion(
     time, tension = arrays.get("t"), arrays.get("tension")
     if time is None or tension is None or "position" not in arrays or time.ndim != 1 or tension.ndim != 2:
         raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
-    if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MOST_CABLES:
+    if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MAX_CABLES:
         raise DamagedError("it is not a motion of two cables or more")
     # Motions of straight lines know no P0.
     bounds = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
-MOST_OTHERS = 2
+MAX_OTHERS = 2
 # Columns are unit vectors: a vector that is shorter than this at every pose that was tried is no cocircuit.
 NOTHING = 1e-12
 

@@ -19,7 +19,7 @@ from cspr_jax.numerics.linear.lanes import largest
 from cspr_jax.workspaces.poses import margins
 from cspr_jax.workspaces.poses.facet_normals import (
     CABLES,
-    MOST_OTHERS,
+    MAX_OTHERS,
     CableSubsets,
     Column,
     block,
@@ -187,7 +187,7 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
     wrench_norm = sum((jnp.abs(x) for x in wrench), zero)
     uncertain = rounding * (wrench_norm + most_held) * jnp.abs(inverse)
     noise = rounding if count else zero
-    if count == MOST_OTHERS:
+    if count == MAX_OTHERS:
         noise = 4.0 * noise * largest([jnp.abs(x) for row in rows for x in row])
     stacked = [jnp.stack(row) for row in rows]
     return NullSpace(stacked, jnp.stack([*held, *[zero] * count]), noise, uncertain, most_held)

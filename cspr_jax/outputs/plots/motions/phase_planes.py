@@ -16,7 +16,7 @@ from cspr_jax.store.reading.result import Result
 HIGHEST = 1.25
 FREE: dict[str, Any] = {"color": "black"}
 # Limits that have a colour each.
-MOST_NAMED = 12
+MAX_NAMED = 12
 
 
 def phase_plane_figure(result: Result) -> Figure:
@@ -70,7 +70,7 @@ def _names(data) -> list[tuple[int, int]]:
         np.stack([data["path_binds"].astype(int), data["path_binding_cable"].astype(int)]), axis=1, return_counts=True
     )
     order = np.argsort(-counts, kind="stable")
-    return [(int(flag), int(cable)) for flag, cable in pairs.T[order] if flag][:MOST_NAMED]
+    return [(int(flag), int(cable)) for flag, cable in pairs.T[order] if flag][:MAX_NAMED]
 
 
 def _draw_motion(panel: Axes, data, rows: slice) -> None:

@@ -21,11 +21,11 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 
 # Rows of a motion in a page, at most.
-MOST_ROWS = 1200
+MAX_ROWS = 1200
 # Nodes of paths in a page, at most.
-MOST_NODES = 50_000
+MAX_NODES = 50_000
 # Intervals of failure that the page names; it shades all of them.
-MOST_INTERVALS = 12
+MAX_INTERVALS = 12
 # Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
 CHARTS = ("path", "tension", "rate", "length")
 OF_CABLES = {"tension": "tension", "rate": "speed", "length": "length"}
@@ -98,8 +98,8 @@ def _facts(
 
 def _failures(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     intervals = np.asarray(columns.get("failing", ())).tolist()
-    named = [f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS]]
-    more = [f"{len(intervals) - MOST_INTERVALS} more"] if len(intervals) > MOST_INTERVALS else []
+    named = [f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MAX_INTERVALS]]
+    more = [f"{len(intervals) - MAX_INTERVALS} more"] if len(intervals) > MAX_INTERVALS else []
     return [("fails", f"{', '.join(named + more)}; each shaded in its chart")] if intervals else []
 
 
@@ -114,7 +114,7 @@ def _bounds(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
 
 def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
     # Path speeds, and for each node the words of the limit that binds behind it.
-    if "path_speed" not in columns or len(columns["path_speed"]) > MOST_NODES:
+    if "path_speed" not in columns or len(columns["path_speed"]) > MAX_NODES:
         return None
     minimum, largest, actual, allowed = np.asarray(columns["path_speed"]).T
     flags, cables = (np.asarray(columns[name]).tolist() for name in ("path_binds", "path_binding_cable"))
@@ -160,7 +160,7 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
 
 def _chosen(time: np.ndarray) -> np.ndarray:
     # Choose rows evenly in time, as many as there are or a page takes; where segments meet rows are twice.
-    count = min(len(time), MOST_ROWS)
+    count = min(len(time), MAX_ROWS)
     times = np.linspace(time[0], time[-1], count)
     return np.unique(np.clip(np.searchsorted(time, times - 1e-12), 0, len(time) - 1))
 

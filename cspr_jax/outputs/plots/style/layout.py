@@ -14,7 +14,7 @@ from cspr_jax.outputs.plots.style.labels import principal_angle
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
 # Smallest width of a panel, inches, with its part of labels and colour bar.
-LEAST_WIDTH = 1.6
+MIN_WIDTH = 1.6
 # Below this width, cm, a picture is that of a column: its title has one line, its bars lie below the panels.
 NARROW, INCH = 12.0, 2.54
 
@@ -26,7 +26,7 @@ def is_narrow() -> bool:
 
 def columns_of(count: int) -> int:
     """Number of panels side by side in a picture of the width that `in_style` has set."""
-    possible = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
+    possible = max(1, int(matplotlib.rcParams["figure.figsize"][0] / MIN_WIDTH))
     return min(possible, 2 if count == 4 else min(3, count))
 
 

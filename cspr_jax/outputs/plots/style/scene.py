@@ -21,7 +21,7 @@ ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
 # Margin around the drawn points, over their size.
 MARGIN = 0.04
 # Ticks of an axis at most, and steps that make a picture fit.
-MOST_TICKS, LEAST_TICKS, STEPS = 5, 2, 4
+MAX_TICKS, MIN_TICKS, STEPS = 5, 2, 4
 FILLS = "fills its slot"
 
 
@@ -92,7 +92,7 @@ def fill_panels(figure: Figure) -> None:
     figure.set_layout_engine("none")
     for panel in spaces:
         slot = panel.get_position(original=True)
-        for count in range(MOST_TICKS, 1, -1):
+        for count in range(MAX_TICKS, 1, -1):
             for axis in _axes(panel):
                 axis.set_major_locator(MaxNLocator(count, prune="both"))
             _fill(figure, panel, slot)
@@ -100,10 +100,10 @@ def fill_panels(figure: Figure) -> None:
                 break
         _add_ticks(figure, panel)
         _leave_out(panel)
-        if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < LEAST_TICKS:
+        if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < MIN_TICKS:
             # Two numbers show a scale: rather leave out single ones of many.
             for axis in _axes(panel):
-                axis.set_major_locator(MaxNLocator(MOST_TICKS, prune="both"))
+                axis.set_major_locator(MaxNLocator(MAX_TICKS, prune="both"))
             _fill(figure, panel, slot)
             _leave_out(panel)
 
@@ -112,7 +112,7 @@ def _add_ticks(figure: Figure, panel: Any) -> None:
     # Axes that have space for more ticks than the others get them.
     for axis in _axes(panel):
         usual = axis.get_major_locator()
-        for count in range(2 * MOST_TICKS, LEAST_TICKS, -2):
+        for count in range(2 * MAX_TICKS, MIN_TICKS, -2):
             locator = MaxNLocator(count, steps=[1, 2, 5, 10], prune="both")
             low, high = axis.get_view_interval()
             if len(locator.tick_values(low, high)) <= len(usual()):

@@ -46,9 +46,9 @@ SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
 PRESETS = {"column": 8.0, "page": 9.0}
 UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
 # Panels take at least this fraction of the height; where they have less the picture gets higher, at most so often.
-LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
+MIN_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
 # Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
-SMALLER, LEAST_LETTERS = 0.92, 5.0
+SMALLER, MIN_LETTERS = 0.92, 5.0
 # A picture is held in memory as a whole, several bytes a pixel.
 LARGEST_PIXELS = 1e8
 
@@ -172,7 +172,7 @@ def _enlarge_panels(figure: Figure, style: Style) -> None:
             figure.draw_without_rendering()
         # Panels without space stay where they were.
         fraction = 0.0 if caught else share_of_panels(figure)
-        if fraction >= LEAST_SHARE:
+        if fraction >= MIN_SHARE:
             return
         if style.size is None and 0.0 < fraction <= before:  # panels of a shape of their own
             figure.set_figheight(figure.get_figheight() / HIGHER)
@@ -180,7 +180,7 @@ def _enlarge_panels(figure: Figure, style: Style) -> None:
         before = fraction
         if style.size is None:
             figure.set_figheight(HIGHER * figure.get_figheight())
-        elif style.is_free and letters * SMALLER >= LEAST_LETTERS:
+        elif style.is_free and letters * SMALLER >= MIN_LETTERS:
             letters *= SMALLER
             for text in figure.findobj(Text):
                 text.set_fontsize(SMALLER * float(text.get_fontsize()))
