@@ -8,7 +8,7 @@ import time
 import pytest
 
 from cspr_jax.errors import RefusedError
-from cspr_jax.store import folder, record, shards
+from cspr_jax.store import documents, folder, shards
 from cspr_jax.store.files import checksum, publishing
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.sweep import engine
@@ -89,7 +89,7 @@ def test_without_the_record_s_checksum(tmp_path, monkeypatch):
     sweep = sweep_of(tmp_path, tiles=4)
     go(sweep, tmp_path / "run")
     finished = sweep, tmp_path / "run", content(tmp_path / "run")
-    monkeypatch.setattr(record, "digest", lambda value: Anything(hashlib.sha256(b"").hexdigest()))
+    monkeypatch.setattr(documents, "digest", lambda value: Anything(hashlib.sha256(b"").hexdigest()))
     with pytest.raises((AssertionError, RefusedError)):
         # Most flips in the record break its schema, too.
         test_damage.check_flips(test_damage.flips(finished, tmp_path / "copy", 300), 300)
