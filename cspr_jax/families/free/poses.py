@@ -28,7 +28,7 @@ from cspr_jax.robots.statics.wrench_balance import at_rest
 from cspr_jax.verification.criteria import judged_poses
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+    from jaxtyping import Float
 
 # Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
 REGULAR, SHALLOW = 1e-2, 0.5
@@ -116,7 +116,7 @@ def half_swing(problem: Problem, poses: FreePoses) -> float:
     return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
 
 
-def divided(problem: Problem, poses: FreePoses) -> Int[np.ndarray, "n 3"]:
+def divided(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "n 3"]:
     """Segments whose ends lie on opposite sides of singular poses.
 
     Every motion between them passes one, where the cables cannot carry every wrench, so that none is proved.

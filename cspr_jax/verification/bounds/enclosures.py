@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 
 class Distances(NamedTuple):
@@ -44,7 +44,7 @@ class Distances(NamedTuple):
         low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
         return ((low > self.spools * far) & (far * self.sine < 1.0)).all(1)
 
-    def fail(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
+    def fail(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
         """Tell whether the worst displacements of the spools use up a distance in the middle of each block."""
         return (self.current < self.current_spools * spools[:, None]).any(1)
 

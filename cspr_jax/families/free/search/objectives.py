@@ -14,7 +14,7 @@ import numpy as np
 from cspr_jax.families.free.search.equations import ValueBounds
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 # Weight of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
 LITTLE = 1e-4
@@ -41,7 +41,7 @@ class Objective(NamedTuple):
     start: float = 0.0
     largest: float = np.inf
 
-    def keeps_limits(self, level: Float[np.ndarray, "l s"]) -> Float[np.ndarray, "l"]:
+    def keeps_limits(self, level: Float[np.ndarray, "l s"]) -> Bool[np.ndarray, "l"]:
         """Tell whether motions with these levels keep the limits of the tensions."""
         return np.all(level <= self.largest, axis=1)
 
