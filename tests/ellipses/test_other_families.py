@@ -38,6 +38,7 @@ def assert_meeting(motions):
             np.testing.assert_allclose(a, b, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_swings_go_over_into_a_line():
     """A transition ends with the acceleration of the pendulum that the line at its natural frequency is."""
     result = cspr_jax.plan(swings())

@@ -86,6 +86,7 @@ def test_tensions_on_six_cables(six):
         assert least == pytest.approx(segment["margin"], rel=0.01), i
 
 
+@pytest.mark.thorough
 def test_states_meet_between_segments(six):
     before, after = six.motions
     first, joint = states_of(before, 2)[0], states_of(before, 2)[1]

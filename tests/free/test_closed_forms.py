@@ -186,6 +186,7 @@ def test_ctrl_c_keeps_what_is_proved(monkeypatch):
         cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
 
 
+@pytest.mark.thorough
 def test_a_plan_says_whose_motion_it_is(monkeypatch):
     monkeypatch.setattr(leg, "free_motion", lambda *arguments: missed(free_motion(*arguments)))
     planned = cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})

@@ -164,6 +164,7 @@ def test_intervals_of_failure_are_exact():
     assert len(proof.open[0]) == 3 and all(b - a < 5e-6 for a, b in proof.open[0])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", QUICK)
 def test_several_motions_have_the_proofs_of_each(name):
     splines = [random_spline(seed, middle=CASES[name][0], size=CASES[name][1], count=4 + seed)[0] for seed in range(3)]

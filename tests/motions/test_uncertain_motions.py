@@ -143,6 +143,7 @@ EARLIER = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", [name if name == "prototype" else pytest.param(name, marks=pytest.mark.thorough) for name in EARLIER]
 )

@@ -68,6 +68,7 @@ def checked(path, **choices):
     return plan, found
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", ["docs/examples/hall_plan.toml", pytest.param("sweeps/planar_lines.toml", marks=pytest.mark.thorough)]
 )

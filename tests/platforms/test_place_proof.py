@@ -144,7 +144,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
     return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())
 
 
-@pytest.mark.quick("from rest")
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kind", [pytest.param(USUAL, marks=pytest.mark.thorough), FROM_REST], ids=["between", "from rest"]
 )

@@ -155,8 +155,7 @@ def check_case(case, samples, count):
         check_motion(case.robot, case.limits, case.path, answer, samples)
 
 
-@pytest.mark.ci("3T-4-1-False")
-@pytest.mark.quick("2T-2-0-False")
+@pytest.mark.ci("2T-2-0-False", "3T-4-1-False")
 @pytest.mark.parametrize("kind, seed, outside", QUICK)
 def test_random_paths(kind, seed, outside):
     check_case(least_time_cases.case(kind, seed, outside), SAMPLES["quick"], 60)

@@ -150,6 +150,7 @@ def test_the_robot_beside_a_table(upward, capsys):
             assert said in error and error.count("\n") == 1 and not (upward / f"no{output}").exists()
 
 
+@pytest.mark.thorough
 def test_a_motion_of_the_users_own_is_drawn_with_its_robot(upward, capsys):
     own, robot = upward / "own.csv", str(upward / "robot.toml")
     own.write_text("t,x,y,z\n0,1.5,0.9,2\n1,1.55,0.85,1.9\n2,1.6,0.8,1.7\n")
