@@ -119,7 +119,7 @@ def check_many(
         judge_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}
-    causes = [() if answers.feasible[i] else answers.proved_causes(i, axes) for i in range(count)]
+    causes = [answers.causes_of(i, axes) for i in range(count)]
     return ManyChecks(**arrays, failing=[proof.failing for proof in answers.proof], causes=causes)
 
 

@@ -13,12 +13,12 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.from_places import check_place
 from cspr_jax.maps.grid_map import CHECK_ERROR, GridMap, exceeds
+from cspr_jax.motion.answers import Answers
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import FLAGS, judged_poses
-from cspr_jax.verification.proved_answers import ProvedAnswers
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
 # Flags that say something of a motion beside its contacts.
@@ -77,7 +77,7 @@ class ProvedMap(GridMap):
         }
 
 
-def proved_columns(answers: ProvedAnswers) -> dict[str, np.ndarray]:
+def proved_columns(answers: Answers) -> dict[str, np.ndarray]:
     """Columns of a map of proved motions."""
     columns = {name: getattr(answers, name) for name in ("verdict", "tolerated", "not_tolerated")}
     columns |= {name: getattr(answers, source) for name, source in _COLUMNS.items()}

@@ -14,7 +14,7 @@ from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
 from cspr_jax.verification.criteria import Criterion
-from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers
+from cspr_jax.verification.proved_answers import MotionProof
 
 SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.
@@ -59,10 +59,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
 
 def shown_proof(plan: PlannedMotions) -> MotionProof:
     """The proof of a plan of a single motion."""
-    answers = plan.legs[0].answers
-    if not isinstance(answers, ProvedAnswers):
-        raise TypeError("a check is a plan of one spline")
-    return answers.proof[0]
+    return plan.legs[0].answers.proof[0]
 
 
 def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:

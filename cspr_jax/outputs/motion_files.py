@@ -19,7 +19,7 @@ from cspr_jax.motion.motion import Motion, common_shape, outward
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.binding import binding
 from cspr_jax.outputs.paths import path_columns
-from cspr_jax.plans.causes import cause_columns
+from cspr_jax.outputs.segment_causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -279,7 +279,7 @@ def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
         "segment_tried_arcs": answers.tried_arcs,
         "segment_verdict": answers.verdict,
         "segment_margin": answers.margin,
-        "segment_margin_unit": [MARGIN_UNITS.index(plan.margin_unit(i)) for i in range(len(ends))],
+        "segment_margin_unit": [MARGIN_UNITS.index(plan.details(i)["margin_unit"]) for i in range(len(ends))],
         **cause_columns(plan.causes),
     }
     return {

@@ -9,7 +9,6 @@ from cspr_jax.outputs.paths import path_lines
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
-from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
@@ -114,15 +113,16 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         **{row.name: float(getattr(peaks, row.peak)[i]) for row in LIMITS if row.peak},
         "samples": int(peaks.samples[i]),
     }
-    return fields | dict.fromkeys(_OF_SOME) | plan.details(i) | {"margin_unit": plan.margin_unit(i)}
+    return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
     # The margin of a swing on redundant cables is a multiple of the weight per cable; this one is in N.
     robot = plan.problem.robot
-    if not plan.is_redundant or FAMILIES[plan.keys.family_of(i)].is_line:
+    unit = plan.details(i)["margin_unit"]
+    if not plan.is_redundant or unit == "m/s^2":
         return None
-    if plan.details(i).get("margin_unit") == "N":
+    if unit == "N":
         return float(plan.answers.margin[i])
     return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 

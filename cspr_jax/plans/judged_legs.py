@@ -13,63 +13,12 @@ import numpy as np
 
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.motion.answers import Answers
-from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.verification.judged import Judge
-from cspr_jax.verification.proved_answers import TENSIONS, MotionProof
-
-# Details of segments that hold for cables from points alone.
-FROM_POINTS = (
-    "det_margin",
-    "det_sign_constant",
-    "cable_interference",
-    "cable_distance_min",
-    "platform_interference",
-    "refuted_at",
-    "envelope_oscillations",
-    "least_oscillations",
-)
-
-
-@dataclasses.dataclass(frozen=True)
-class JudgedAnswers(Answers):
-    """Answers of a family with the verdicts of further proofs.
-
-    Fields:
-        plain: the family's, with these verdicts.
-        proofs: of the n motions; None: the family refuses the motion, or has none.
-    """
-
-    plain: Answers
-    proofs: list[MotionProof | None]
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether each segment is proved feasible, (n,)."""
-        return self.plain.feasible
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Details of the family, and intervals of failure; see `Answers.details`."""
-        details, proof = self.plain.details(i), self.proofs[i]
-        return details if proof is None else details | proof.details
-
-    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
-        """Causes by the proof, unless it says nothing against the motion; see `Answers.proved_causes`."""
-        proof = self.proofs[i]
-        return proof.causes(frame) if proof is not None and proof.verdict else self.plain.proved_causes(i, frame)
-
-
-class PulleyAnswers(JudgedAnswers):
-    """Answers of motions over pulleys; margins are those of the tensions, in N."""
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Details that do not rest on cables from points; see `Answers.details`."""
-        details = {name: value for name, value in super().details(i).items() if name not in FROM_POINTS}
-        return details | {"margin_unit": "N"}
+from cspr_jax.verification.proved_answers import MotionProof, margins_of
 
 
 class JudgedLeg(Leg):
@@ -93,9 +42,8 @@ class JudgedLeg(Leg):
         return self._leg.warnings(_from_points(problem))
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
-        """Outcome by the family's answers; see `Leg.result`."""
-        plain = joined.answers.plain if isinstance(joined.answers, JudgedAnswers) else joined.answers
-        return self._leg.result(problem, dataclasses.replace(joined, answers=plain), tension_min, start)
+        """Result by the family's answers; see `Leg.result`."""
+        return self._leg.result(problem, joined, tension_min, start)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
@@ -120,8 +68,6 @@ class JudgedLeg(Leg):
             if key not in joined:
                 joined[key] = self._with(full).join(plain, z0)
             answers, motions = joined[key]
-            if len(rows) == len(self):  # answers of lines have no rows
-                return answers, motions
             return answers.rows(rows), [motions[i] for i in rows]
 
         is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
@@ -131,13 +77,7 @@ class JudgedLeg(Leg):
         maximum = waypoints.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
         motions = join(np.arange(len(self)), judged.arcs)[1]
-        from cspr_jax.verification.attained import attained
-
-        proofs = [
-            None if proof is None else attained(problem, motion, proof, judge.scene, contacts_alone=not has_pulleys)
-            for motion, proof in zip(motions, judged.proofs, strict=True)
-        ]
-        return _answers(judged.answers, proofs, has_pulleys=has_pulleys), motions
+        return _answers(judged.answers, judged.proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)
@@ -158,17 +98,15 @@ def _from_points(problem: Problem) -> Problem:
     return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None))
 
 
-def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> JudgedAnswers:
-    columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(Answers)}
+def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> Answers:
+    # Over pulleys margins are those of the proofs: motions that the family refuses have none.
+    each = np.empty(len(proofs), object)
+    each[:] = proofs
     if not has_pulleys:
-        return JudgedAnswers(**columns, plain=plain, proofs=proofs)
-    nothing = np.full(len(proofs), np.nan)
-    columns |= dict.fromkeys(("margin", "margin_bound", "limit_margin", "feasible_at_infinity"), nothing)
-    for name, side, others in (("margin", "high", 0), ("margin_bound", "low", 0), ("limit_margin", "high", 1)):
-        columns[name] = np.array(
-            [
-                np.nan if proof is None else proof.least(getattr(proof.proof, side), TENSIONS, others=bool(others))
-                for proof in proofs
-            ]
-        )
-    return PulleyAnswers(**columns, plain=plain, proofs=proofs)
+        return dataclasses.replace(plain, proof=each)
+    is_proved = np.array([proof is not None for proof in proofs])
+    columns: dict[str, Any] = {"feasible_at_infinity": np.full(len(proofs), np.nan)}
+    for name, column in margins_of(each[is_proved].tolist()).items():
+        columns[name] = np.full(len(proofs), np.nan)
+        columns[name][is_proved] = column
+    return dataclasses.replace(plain, proof=each, margin_unit="N", **columns)

@@ -70,7 +70,7 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
         points=np.full((2, 3), np.nan),
         legs=(JoinedLeg("spline", answers, []),),
         demands=dataclasses.replace(extremes, lowest=frame.height(extremes.lowest)),
-        causes=(() if answers.feasible[0] else answers.proved_causes(0, frame),),
+        causes=(answers.causes_of(0, frame),),
         warnings=tuple(f"{path}: {note}" for note in notes),
     )
 

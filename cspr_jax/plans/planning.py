@@ -16,13 +16,13 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
+from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import JoinedLeg, LegResult
 from cspr_jax.motion.motion import Motion, Placed, states_at
 from cspr_jax.motion.peaks import SAMPLES, Peaks, peaks
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
-from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.model.limits import NO_LIMITS
@@ -32,6 +32,17 @@ from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
 
+# Details of segments that hold for cables from points alone.
+FROM_POINTS = (
+    "det_margin",
+    "det_sign_constant",
+    "cable_interference",
+    "cable_distance_min",
+    "platform_interference",
+    "refuted_at",
+    "envelope_oscillations",
+    "least_oscillations",
+)
 # Value that a search for z0 takes for a "best" epsilon, until that is chosen.
 FIRST_EPSILON = 0.2
 # Positions may differ by this part of the robot's size where families change, accelerations by this part of gravity.
@@ -90,14 +101,10 @@ class PlannedMotions:
         """Details of a segment that only its family has."""
         for leg in self.legs:
             if i < len(leg.motions):
-                return leg.answers.details(i)
+                details, pulleys = leg.answers.details(i), self.problem.robot.pulleys
+                return {name: value for name, value in details.items() if pulleys is None or name not in FROM_POINTS}
             i -= len(leg.motions)
         raise IndexError(i)
-
-    def margin_unit(self, i: int) -> str:
-        """Unit of the margin of a segment."""
-        of_family = "m/s^2" if FAMILIES[self.keys.family_of(i)].is_line else "1"
-        return self.details(i).get("margin_unit") or of_family
 
     @property
     def motions(self) -> list[Placed]:
@@ -152,8 +159,8 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(JoinedLeg(leg.waypoints.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.waypoints.frame
-    legs = tuple(_attained(problem, leg, sequence.waypoints) for leg in legs)
-    why, extremes = _judged(problem, robot_file, frame, legs, keys)
+    legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
+    why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, keys)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.waypoints, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
@@ -179,37 +186,38 @@ def _point(keys: PlanFile, sequence: PlanLegs) -> str:
     return keys.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
-def _attained(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
-    # The leg with margins and causes that its motions attain, where proofs bound them.
-    if not hasattr(leg.answers, "proof"):
+def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
+    # Families prove feasible motions faster; why one is not feasible is for the proof of any motion to say.
+    if leg.answers.feasible.all() and not any(proof is not None for proof in leg.answers.proof):
         return leg
-    # Families with proofs of their own need none of these.
+    # Feasible plans of such families need none of these.
     from cspr_jax.build.scenes import scene_of
     from cspr_jax.verification.attained import with_attained
 
-    answers: Any = leg.answers
     keys = waypoints.plan_file
     scene = scene_of(problem.robot, waypoints.robot_file, waypoints.frame, keys, waypoints.path, trajectory=keys)
-    return dataclasses.replace(leg, answers=with_attained(problem, answers, leg.motions, scene))
+    return dataclasses.replace(leg, answers=with_attained(problem, leg.answers, leg.motions, scene))
 
 
 def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:
     """A plan with other motions between its poses."""
     legs = (JoinedLeg(plan.keys.family, answers, motions),)
-    why, extremes = _judged(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
+    why, extremes = _causes(plan.frame, legs), _extremes(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
     lines = [*plan.warnings, *lines, *_missed(plan.keys, answers.feasible, extremes)]
     warnings = tuple(dict.fromkeys(lines))
     return dataclasses.replace(plan, legs=legs, demands=extremes, causes=why, warnings=warnings)
 
 
-def _judged(
+def _causes(frame: Frame, legs: tuple[JoinedLeg, ...]) -> tuple[tuple[Cause, ...], ...]:
+    return tuple(leg.answers.causes_of(i, frame) for leg in legs for i in range(len(leg.motions)))
+
+
+def _extremes(
     problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
-) -> tuple[tuple[tuple[Cause, ...], ...], Peaks]:
-    # Causes of the segments, and demands with heights in the axes of the robot file.
-    why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
+) -> Peaks:
+    # Heights are in the axes of the robot file.
     extremes = _demands(problem, legs, keys, _shape(problem, robot_file, frame, keys))
-    heights = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
-    return tuple(itertools.chain.from_iterable(why)), heights
+    return dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
 
 
 def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile) -> np.ndarray | None:

@@ -17,12 +17,12 @@ from cspr_jax.families.paths.least_time.discrete import FASTER
 from cspr_jax.families.paths.least_time.least_time import LeastTime, least_time_motions
 from cspr_jax.families.paths.leg import Ride, cut, section_answer
 from cspr_jax.families.paths.retraced import Retraced, retraced
-from cspr_jax.motion.answers import replaced
+from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.plans.planning import PlannedMotions, with_motions
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.attained import with_attained
-from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.verification.proved_answers import proved_answers
 
 # Part of the planned duration by which a motion is shorter at least that takes its place.
 LEAST_GAIN = 1e-4
@@ -102,8 +102,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
 
 def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:
     # Feeds that the motions of a plan keep.
-    proofs = [getattr(leg.answers, "proof", [None] * len(leg.motions)) for leg in plan.legs]
-    return [getattr(proof, "feeds", None) for each in proofs for proof in each]
+    return [getattr(proof, "feeds", None) for leg in plan.legs for proof in leg.answers.proof]
 
 
 def _feeds_along(faster: Sequence[_Faster], count: int) -> list[np.ndarray | None]:
@@ -139,9 +138,7 @@ def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_ti
     return [answers[k] for k in range(len(paths))]
 
 
-def _answers(
-    plan: PlannedMotions, faster: Sequence[_Faster], proved: ProvedAnswers, is_better: np.ndarray
-) -> RetimedAnswers:
+def _answers(plan: PlannedMotions, faster: Sequence[_Faster], proved: Answers, is_better: np.ndarray) -> RetimedAnswers:
     # Sections are told of motions that are run along again, and bounds of all.
     count = len(is_better)
     bound, deviation = np.zeros(count), np.zeros(count)
@@ -165,7 +162,7 @@ def _answers(
     )
 
 
-def _is_better(plan: PlannedMotions, answers: ProvedAnswers, faster: Sequence[_Faster]) -> np.ndarray:
+def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]) -> np.ndarray:
     # Motions (n,) that replace those of the plan: all of those between two poses at rest, or none.
     before, after = np.array(plan.answers.duration), answers.duration
     group = np.arange(len(before))
@@ -180,8 +177,8 @@ def _is_better(plan: PlannedMotions, answers: ProvedAnswers, faster: Sequence[_F
 
 
 def _with_planned(
-    plan: PlannedMotions, scene: Scene, answers: ProvedAnswers, motions: list[Motion], rows: np.ndarray
-) -> ProvedAnswers:
+    plan: PlannedMotions, scene: Scene, answers: Answers, motions: list[Motion], rows: np.ndarray
+) -> Answers:
     # Answers with those of motions that stay, whose family has proved what it says is feasible.
     if not len(rows):
         return answers

@@ -7,10 +7,11 @@ millionth of the duration, and better.
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
+from cspr_jax.motion.answers import AnyAnswers
 from cspr_jax.motion.motion import BESIDE, Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_values
@@ -18,7 +19,7 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.criteria import levels
-from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, margins_of
+from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
 # Samples that are followed for each criterion at first, and then; rounds, each eight times as fine.
@@ -26,22 +27,33 @@ STARTS, FOLLOWED, ROUNDS = 6, 2, 7
 # Blocks of a criterion that are sampled at most: those with the smallest upper bounds.
 MOST_BLOCKS = 1000
 Slacks = Callable[[np.ndarray], np.ndarray]
-AnyProved = TypeVar("AnyProved", bound=ProvedAnswers)
 
 
 def with_attained(
-    problem: Problem, answers: AnyProved, motions: Sequence[Motion], scene: Scene | None = None
-) -> AnyProved:
-    """Answers whose margins and causes are those that motions attain."""
+    problem: Problem, answers: AnyAnswers, motions: Sequence[Motion], scene: Scene | None = None
+) -> AnyAnswers:
+    """Answers with a proof of every segment that is not feasible, and in each proof what its motion attains.
+
+    Margins of proofs are those that motions attain, too.
+    """
     proofs = np.array(answers.proof)
     for i, motion in enumerate(motions):
-        proofs[i] = attained(problem, motion, answers.proof[i], scene)
-    return dataclasses.replace(answers, proof=proofs, **margins_of(list(proofs)))
+        is_known = proofs[i] is not None and not (proofs[i].contacts_alone and not proofs[i].verdict)
+        if not is_known and not answers.feasible[i]:
+            proofs[i] = proof_of(problem, motion, scene)
+        if proofs[i] is not None:
+            proofs[i] = attained(problem, motion, proofs[i], scene)
+    answers = dataclasses.replace(answers, proof=proofs)
+    if answers.margin_unit != "N" or not all(proofs):
+        return answers
+    moves = np.isfinite(answers.duration)
+    margins: dict[str, Any] = {
+        name: np.where(moves, column, np.nan) for name, column in margins_of(list(proofs)).items()
+    }
+    return dataclasses.replace(answers, **margins)
 
 
-def attained(
-    problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None, *, contacts_alone: bool = False
-) -> MotionProof:
+def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None) -> MotionProof:
     """A proof whose smallest slacks, and their times, are those that the motion attains."""
     proof, duration = case.proof, float(motion.duration())
     columns = _nearest(case)
@@ -52,7 +64,7 @@ def attained(
         times = tau[0]
         states = states_as_bounds(motion, times)
         bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
-        return block_slacks(*bounds, contacts_alone=contacts_alone).high[None, :, columns]
+        return block_slacks(*bounds, contacts_alone=case.contacts_alone).high[None, :, columns]
 
     columns = columns[columns < proof.near.slacks.low.shape[1]]  # feeds come last, from another proof
     smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))

@@ -17,7 +17,7 @@ from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of, sampled_proof
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 
 if TYPE_CHECKING:
@@ -119,12 +119,7 @@ class Judge(NamedTuple):
             several = motions.take(rows)
             return proofs_of(self.problem, several.bounds, several.durations, intervals=intervals, **how)
         chosen = [motions[i] for i in rows]
-        return [
-            proof_of(self.problem, motion, intervals=intervals, **how)
-            if hasattr(motion, "bounds")
-            else sampled_proof(self.problem, motion, **how)
-            for motion in chosen
-        ]
+        return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
         # Judge feasible motions for all robots within an uncertainty; the family has done so but for contacts.

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cspr_jax.motion.answers import Answers
-from cspr_jax.motion.cause import UNITS, Cause
-from cspr_jax.motion.motion import BoundedMotion, Motion
+from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.linear.frames import Frame
-from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.bounds.state_bounds import StateBounds, at_rest
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -44,6 +44,7 @@ class MotionProof(NamedTuple):
         obstacles: their names.
         feeds: (pieces,) largest speed of the mass centre in each piece of the motion, m/s, inf for none; None: there
             are none.
+        contacts_alone: whether only contacts are proved, of a motion whose family proves the rest.
     """
 
     criteria: tuple[Criterion, ...]
@@ -51,6 +52,7 @@ class MotionProof(NamedTuple):
     scales: np.ndarray
     obstacles: tuple[str, ...] = ()
     feeds: np.ndarray | None = None
+    contacts_alone: bool = False
 
     @property
     def is_feasible(self) -> bool:
@@ -117,41 +119,21 @@ class MotionProof(NamedTuple):
         """Intervals of failure, as `Answers.details` gives them."""
         return {"failing": self.failing.tolist(), "failing_by_criterion": self.failing_by_criterion}
 
-    def causes(self, frame: Frame) -> tuple[Cause, ...]:
-        """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it."""
+    def causes(self, frame: Frame, flags: Verdict) -> tuple[Cause, ...]:
+        """The worst cable of each criterion that some flags name, the worst one first; see `SegmentProof`.
+
+        Where they name none, the criteria that fail; where none does, the one nearest to it, as undecided.
+        """
         order = np.argsort((self.proof.high - levels(self.criteria)) / self.scales).tolist()
-        if not self.broken.any():
+        chosen = [k for k in order if self.criteria[k].flag & flags] or [k for k in order if self.broken[k]]
+        if not chosen:
             return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
-        order = [k for k in order if self.broken[k]]
-        flags = [self.criteria[k].flag for k in order]
-        return tuple(cause_of(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
-
-
-@dataclasses.dataclass(frozen=True)
-class ProvedAnswers(Answers):
-    """Answers of motions that are proved or refuted over their whole time; margins are those of the tensions, in N.
-
-    Fields:
-        proof: (n,) `MotionProof` of each.
-    """
-
-    proof: np.ndarray
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether each motion is feasible, (n,): proved."""
-        return self.verdict == 0
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Intervals of failure and the unit of the margin; see `Answers.details`."""
-        return {"margin_unit": "N"} | self.proof[i].details
-
-    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
-        """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
-        if self.verdict[i] == Verdict.UNCERTAINTY or not self.proof[i].verdict:
-            flag, stands = Verdict.UNCERTAINTY, float(np.fmin(self.tolerated[i], self.not_tolerated[i]))
-            return (Cause(flag.text, needed=1.0, allowed=stands, unit=UNITS[flag]),)
-        return self.proof[i].causes(frame)
+        worst = {self.criteria[k].flag: k for k in reversed(chosen)}
+        named = list(dict.fromkeys(self.criteria[k].flag for k in chosen))
+        # Tensions grow without bound towards the plane of the spools.
+        unbounded = [flag for flag in named if flag & TENSIONS and Verdict.ABOVE_SPOOLS in named]
+        bounded = [flag for flag in named if flag not in unbounded]
+        return (*(cause_of(self, worst[flag], frame) for flag in bounded), *(Cause(flag.text) for flag in unbounded))
 
 
 def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
@@ -166,9 +148,9 @@ def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
 
 def proved_answers(
     problem: Problem, motions: Sequence[Any], scene: Scene | None = None, feeds: Sequence[np.ndarray | None] = ()
-) -> ProvedAnswers:
+) -> Answers:
     """Answers of motions, by bounds of their states; a motion that gives none is sampled."""
-    proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
+    proofs = [proof_of(problem, motion, scene) for motion in motions]
     for i, speeds in enumerate(feeds):
         proofs[i] = proofs[i].with_feeds(motions[i], speeds)
     answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
@@ -176,9 +158,7 @@ def proved_answers(
     return answers
 
 
-def judge_all_robots(
-    problem: Problem, answers: ProvedAnswers, motions: Sequence[Any], scene: Scene | None = None
-) -> None:
+def judge_all_robots(problem: Problem, answers: Answers, motions: Sequence[Any], scene: Scene | None = None) -> None:
     """Judge feasible motions for all robots within an uncertainty, if there is one."""
     if problem.limits.uncertainty is not None:
         for i in np.flatnonzero(answers.feasible).tolist():
@@ -190,13 +170,15 @@ def judge_all_robots(
 
 def proof_of(
     problem: Problem,
-    motion: BoundedMotion,
+    motion: Any,
     scene: Scene | None = None,
     *,
     contacts_alone: bool = False,
     intervals: bool = True,
 ) -> MotionProof:
-    """Proof of one motion."""
+    """Proof of one motion; samples refute one that gives no bounds, or has no duration."""
+    if not hasattr(motion, "bounds") or not np.isfinite(float(motion.duration())):
+        return sampled_proof(problem, motion, scene, contacts_alone=contacts_alone)
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
     durations = np.array([float(motion.duration())])
 
@@ -228,25 +210,27 @@ def proofs_of(
     names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), intervals=intervals)
-    return [_proof(problem, rows, proof, scene) for proof in proofs]
+    return [_proof(problem, rows, proof, scene, contacts_alone) for proof in proofs]
 
 
 def _criteria(problem: Problem, scene: Scene | None, contacts_alone: bool) -> tuple[Criterion, ...]:
     return tuple((contact_criteria if contacts_alone else criteria)(problem.robot, problem.limits, scene))
 
 
-def _proof(problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None) -> MotionProof:
+def _proof(
+    problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None, contacts_alone: bool
+) -> MotionProof:
     names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
-    return MotionProof(rows, proof, _scales(problem, rows), names)
+    return MotionProof(rows, proof, _scales(problem, rows), names, contacts_alone=contacts_alone)
 
 
-def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) -> ProvedAnswers:
+def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) -> Answers:
     """Answers of proofs."""
     count = len(proofs)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     each = np.empty(count, object)
     each[:] = proofs
-    return ProvedAnswers(
+    return Answers(
         arcs=none,
         tried_arcs=none,
         verdict=np.array([proof.verdict.value for proof in proofs], FLAGS),
@@ -255,6 +239,7 @@ def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) 
         feasible_at_infinity=nothing,
         tolerated=nothing.copy(),
         not_tolerated=nothing.copy(),
+        margin_unit="N",
         proof=each,
     )
 
@@ -276,27 +261,30 @@ def sampled_proof(
     *,
     contacts_alone: bool = False,
 ) -> MotionProof:
-    """Refute a motion that has no bounds by its samples, or leave it undecided."""
-    tau = np.linspace(0.0, 1.0, samples + 1)
+    """Refute a motion that has no bounds by its samples, or leave it undecided.
+
+    A motion that takes no finite time is sampled at rest along its path, with no time but that of its start.
+    """
+    tau, duration = np.linspace(0.0, 1.0, samples + 1), float(motion.duration())
+    states, times = states_as_bounds(motion, tau), tau * duration
+    if not np.isfinite(duration):
+        states, times = at_rest(states), np.where(tau > 0.0, np.nan, 0.0)
     # A block without a length has the slacks of its instant.
-    states = states_as_bounds(motion, tau)
-    rows = _criteria(problem, scene, contacts_alone)
     high = block_slacks(
         problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
     ).high
-    times = tau * float(motion.duration())
-    failing = [_runs(times, column) for column in (high < levels(rows)).T]
+    rows, high = _criteria(problem, scene, contacts_alone), np.where(np.isnan(high), np.inf, high)
     full = np.array([[0.0, times[-1]]])
     proof = TimeProof(
         low=np.full(high.shape[1], -np.inf),
         high=high.min(0),
         when=times[high.argmin(0)],
-        failing=failing,
+        failing=[_runs(times, column) for column in (high < levels(rows)).T],
         open=[full] * high.shape[1],
         blocks=len(tau),
         near=_between(times, high),
     )
-    return _proof(problem, rows, proof, scene)
+    return _proof(problem, rows, proof, scene, contacts_alone)
 
 
 def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
@@ -307,7 +295,9 @@ def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    # First and last instants of runs of flags, (m, 2).
+    # First and last times of runs of flags, (m, 2), where times are known.
+    if np.isnan(times[-1]):
+        return np.empty((0, 2))
     edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
     return np.stack([times[edges[:-1] == 1], times[edges[1:] == -1]], axis=1)
 

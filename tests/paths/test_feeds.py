@@ -130,6 +130,6 @@ def test_feeds_that_are_exceeded_are_refused():
     t = np.linspace(*KNOTS[3:5], 100_001)
     first = t[np.argmax(speed_at(t) > slow[3])]
     np.testing.assert_allclose(answers.proof[2].failing, [[first, KNOTS[4]]], atol=2e-5)
-    (cause,) = answers.proved_causes(2, None)  # no heights among them: of any frame
+    (cause,) = answers.causes_of(2, None)  # no heights among them: of any frame
     assert cause.needed == pytest.approx(PEAK, rel=1e-3)
     assert cause.text == f"the mass centre needs {cause.needed:.3g} m/s at t = 1.00 s, the feed allows 0.0844"

@@ -1,7 +1,5 @@
 """What stands between a motion and feasible: the limit without which there is one, with its numbers."""
 
-import dataclasses
-
 import h5py
 import jax
 import numpy as np
@@ -10,7 +8,6 @@ from support.commands import cspr, plan, planned
 from swings.test_decide import LIMITS, answered, limited, problem
 
 import cspr_jax
-from cspr_jax.plans.causes import causes
 from cspr_jax.robots.cables import cable_motion
 from cspr_jax.schema.verdicts import Verdict
 
@@ -197,19 +194,19 @@ def test_a_platform_that_one_limit_refuses(limits, key, flag):
 
 
 @pytest.mark.thorough
-def test_a_contact_has_a_time_where_nothing_else_refutes_the_motion():
-    """The time at which tensions or limits refute it is not that of the contact."""
+def test_causes_of_a_platform_are_those_of_the_proof_of_any_motion():
+    """Each has the time, the cable and the numbers of the instant at which the motion breaks it most."""
     plan = cspr_jax.plan(MSSM | {"cable_speed_max": 1.2})
-    (leg,), contact = plan.legs, Verdict.CABLE_PLATFORM
-    for verdict, expected in (
-        (contact, 0.5),
-        (contact | Verdict.NO_ARCS, 0.5),
-        (contact | Verdict.SLACK_CABLE, np.nan),
-    ):
-        answers = dataclasses.replace(leg.answers, verdict=np.array([verdict.value]), refuted_at=np.array([0.5]))
-        found = causes(plan.problem, plan.frame, answers, leg.motions, np.array([101]))[0]
-        (time,) = (cause.t for cause in found if cause.criterion == "cable_platform")
-        assert time == pytest.approx(expected, nan_ok=True)
+    (leg,), (segment,) = plan.legs, plan.to_dict()["segments"]
+    (cause,), (motion,) = plan.causes[0], leg.motions
+    tau = np.linspace(0.0, 1.0, 20001)
+    speeds = np.abs(jax.vmap(lambda t: cable_motion(plan.problem.robot, motion.state(t))[1])(tau))
+    assert cause.needed == pytest.approx(speeds.max(), rel=1e-6)
+    assert cause.cables == (int(np.argmax(speeds.max(0))),)
+    too_fast = tau[(speeds > 1.2).any(1)] * segment["duration"]
+    (first, *_), (*_, last) = segment["failing"][0], segment["failing"][-1]
+    assert (first, last) == pytest.approx((too_fast[0], too_fast[-1]), abs=2e-4 * segment["duration"])
+    assert list(segment["failing_by_criterion"]) == ["cable_too_fast"]
 
 
 @pytest.mark.thorough

@@ -25,15 +25,15 @@ from cspr_jax.families.swings.transitions.oscillations import OscillationAnswers
 from cspr_jax.families.swings.transitions.oscillations import minimum_oscillations as search_oscillations
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import each
 from cspr_jax.motion.motion import Placed
-from cspr_jax.motion.peaks import SAMPLES
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame
-from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, rest_point
+from cspr_jax.verification.attained import with_attained
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,9 +67,8 @@ class WithMotions:
             placed, count = self.make(self), len(self.verdict)
             if not count:
                 return []
-            frame = each(placed.frame, count)[0]
-            samples = SAMPLES * np.maximum(self.tried_arcs, 2) + 1
-            return causes(self.problem, frame, self, each(placed.motion, count), samples)
+            frame, answers = each(placed.frame, count)[0], with_attained(self.problem, self, each(placed.motion, count))
+            return [answers.causes_of(i, frame) for i in range(count)]
 
 
 @dataclasses.dataclass(frozen=True)

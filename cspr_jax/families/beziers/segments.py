@@ -13,9 +13,7 @@ from cspr_jax.families.beziers.durations import feasible_durations, least_durati
 from cspr_jax.families.beziers.motion import Bezier, end_acceleration
 from cspr_jax.families.beziers.verdicts import verdicts
 from cspr_jax.motion.answers import Answers
-from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.linear.frames import Frame
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -38,41 +36,16 @@ class BezierAnswers(Answers):
     release: np.ndarray
     flight_time: np.ndarray
 
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether each segment is proved feasible, (n,)."""
-        return self.verdict == 0
-
     def details(self, i: int) -> dict[str, Any]:
         """Details of a segment; see `Answers.details`."""
         durations = None if self.taut_durations[i] is None else self.taut_durations[i].tolist()
-        return {
+        return super().details(i) | {
             "control_points": self.control_points[i].tolist(),
             "taut_durations": durations,
             "least_duration": durations[0][0] if durations else None,
             "arcs": None,
             "tried_arcs": None,
         }
-
-
-@dataclasses.dataclass(frozen=True)
-class RedundantBezierAnswers(BezierAnswers):
-    """Answers of Bezier segments on more cables than degrees of freedom; margins in N.
-
-    Fields:
-        proof: (n,) `verification.proved_answers.MotionProof` of each.
-    """
-
-    proof: np.ndarray
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Details, the unit of the margin, and intervals of failure; see `Answers.details`."""
-        proof = self.proof[i]
-        return super().details(i) | {"margin_unit": "N", "failing": None if proof is None else proof.failing.tolist()}
-
-    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
-        """The criteria that fail, else the one nearest to it; see `Answers.proved_causes`."""
-        return None if self.proof[i] is None else self.proof[i].causes(frame)
 
 
 class Joined(NamedTuple):
@@ -127,7 +100,7 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
     intervals = np.empty(count, object)
     for i, durations in enumerate(segments.taut_durations):
         intervals[i] = durations
-    answers = BezierAnswers(
+    return BezierAnswers(
         none,
         none,
         judgements.verdict,
@@ -139,5 +112,6 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,
         *(np.full(count, np.nan) for _ in range(2)),
+        margin_unit="1" if proofs is None else "N",
+        proof=np.full(count, None) if proofs is None else proofs,
     )
-    return answers if proofs is None else RedundantBezierAnswers(**vars(answers), proof=proofs)

@@ -42,11 +42,11 @@ from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import ProvedAnswers, answers_of, judge_all_robots
+from cspr_jax.verification.proved_answers import answers_of, judge_all_robots
 
 
 @dataclasses.dataclass(frozen=True)
-class EllipseAnswers(ProvedAnswers):
+class EllipseAnswers(Answers):
     """Answers of segments that end on ellipses, or at rest; margins are those of the tensions, in N.
 
     Fields:
@@ -56,11 +56,6 @@ class EllipseAnswers(ProvedAnswers):
 
     of_ellipses: np.ndarray
     flight_time: np.ndarray
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether each segment is proved feasible, (n,); a smaller number of arcs may still be undecided."""
-        return (self.verdict & ~np.array(Verdict.FEWER_ARCS_UNDECIDED.value, FLAGS)) == 0
 
     def details(self, i: int) -> dict[str, Any]:
         """Frequencies, and details of proofs; see `Answers.details`."""

@@ -17,9 +17,10 @@ from cspr_jax.families.free.search.basis import DEGREE, Basis
 from cspr_jax.families.free.search.interior_point import again, optima, started
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
 from cspr_jax.maps.proved_map import CONTACTS
+from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
-from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, answers_of, judge_all_robots, proofs_of
+from cspr_jax.verification.proved_answers import MotionProof, answers_of, judge_all_robots, proofs_of
 
 # Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
 # proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
@@ -40,7 +41,7 @@ class ManyFreeMotions(NamedTuple):
 
     indices: np.ndarray
     motions: list[Spline]
-    answers: ProvedAnswers
+    answers: Answers
 
 
 def free_motions(

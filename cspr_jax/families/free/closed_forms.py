@@ -10,12 +10,12 @@ from cspr_jax.families.free.poses import BACK, FreePoses
 from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks
+from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.model.point_mass import spool_radius
-from cspr_jax.verification.proved_answers import ProvedAnswers
 
 # Part of the robot's radius, and of the speed of a fall from its height, by which motions may miss poses.
 NEAR = 1e-9
@@ -38,7 +38,7 @@ class ClosedForm(NamedTuple):
     motions: list[Motion]
     is_feasible: np.ndarray
     duration: np.ndarray
-    answers: ProvedAnswers | None = None
+    answers: Answers | None = None
 
     def segment(self, i: int) -> "ClosedForm":
         """The motion of one segment alone."""
@@ -56,7 +56,8 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
             answers, motions = leg.join(problem, poses.z0)
         except (ConfigError, InputError):
             continue  # the family joins other poses
-        proved = answers if isinstance(answers, ProvedAnswers) else None
+        is_full = all(proof is not None and not proof.contacts_alone for proof in answers.proof)
+        proved = answers if is_full else None
         form = ClosedForm(leg.waypoints.family, motions, answers.feasible, np.asarray(answers.duration), proved)
         if answers.feasible.any() and _passes(form, problem, poses):
             forms.append(form)

@@ -17,10 +17,11 @@ from cspr_jax.families.free.search.basis import DEGREE, Basis
 from cspr_jax.families.free.search.interior_point import Ending, Optima, OutOfTime, optima, started
 from cspr_jax.families.free.search.starts import Starts, joined_starts, starts
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
+from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.runtime.stages import stage
-from cspr_jax.verification.proved_answers import ProvedAnswers, judge_all_robots
+from cspr_jax.verification.proved_answers import judge_all_robots
 
 # Weights of barriers, and softness, with which searches go on from a coarser motion.
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
@@ -80,7 +81,7 @@ class FreeMotion:
     """
 
     motions: list[Spline]
-    answers: ProvedAnswers
+    answers: Answers
     energy: np.ndarray
     level: np.ndarray
     is_optimal: bool

@@ -30,7 +30,6 @@ from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.proved_answers import ProvedAnswers
 
 LEVELS = ("tension", "margin")
 STOPPED = "the search was stopped before its end: more starts might have led to a better motion"
@@ -46,7 +45,7 @@ MISSED = "the search found no motion that keeps all limits; the numbers are thos
 
 
 @dataclasses.dataclass(frozen=True)
-class FreeAnswers(ProvedAnswers):
+class FreeAnswers(Answers):
     """Answers of free motions.
 
     Fields:

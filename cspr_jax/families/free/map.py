@@ -13,10 +13,11 @@ from cspr_jax.families.free.poses import FreePoses, check_searched
 from cspr_jax.families.free.search.time_bounds import time_bounds
 from cspr_jax.families.free.static_poses import OF_PLACES
 from cspr_jax.maps.proved_map import ProvedMap, proved_columns
+from cspr_jax.motion.answers import Answers
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import ProvedAnswers, answers_of, judge_all_robots, proofs_of
+from cspr_jax.verification.proved_answers import answers_of, judge_all_robots, proofs_of
 
 
 class FreeMap(ProvedMap):
@@ -83,7 +84,7 @@ class FreeMap(ProvedMap):
             for name, column in proved_columns(answers).items():
                 columns[name][reached] = column
 
-    def _at_rest(self, positions: np.ndarray) -> ProvedAnswers:
+    def _at_rest(self, positions: np.ndarray) -> Answers:
         # A second of rest in each position.
         motions = [
             Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), self._turning())

@@ -24,7 +24,7 @@ from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.interior_point import started
 from cspr_jax.families.free.search.starts import ARCS
 from cspr_jax.families.free.search.tasks import OUTER, Tasks
-from cspr_jax.motion.answers import replaced
+from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.motion import Motion, common_shape, states_at
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
@@ -33,7 +33,7 @@ from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.cables import AnyRobot, tensions
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.verification.proved_answers import proved_answers
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -146,7 +146,7 @@ def stood_in(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
 ) -> FreeMotion:
     """Lines in place of a search that has been stopped before it has found anything."""
-    motions, answers = cast(list[Spline], line.motions), cast(ProvedAnswers, line.answers)
+    motions, answers = cast(list[Spline], line.motions), cast(Answers, line.answers)
     energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
     families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
     return FreeMotion(motions, answers, energy, level, False, True, np.nan, (), families)

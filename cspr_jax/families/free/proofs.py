@@ -10,10 +10,11 @@ from cspr_jax.families.free.problem import FreeQuestion, slacks_of, tightened
 from cspr_jax.families.free.robust import for_all_robots, widened
 from cspr_jax.families.free.search.interior_point import Ending, OutOfTime, again, optima
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
+from cspr_jax.motion.answers import Answers
 from cspr_jax.robots.model.limits import Uncertainty
 from cspr_jax.runtime.stages import stage
 from cspr_jax.verification.piece_slacks import PieceSlacks
-from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.verification.proved_answers import proved_answers
 
 # Rounds of proof and tightening, and rounds before in which slack is left for all robots.
 ROUNDS, WIDER = 10, 3
@@ -37,7 +38,7 @@ class FreeProof(NamedTuple):
     tasks: Tasks
     unknowns: Unknowns
     motions: list[Spline]
-    answers: ProvedAnswers
+    answers: Answers
     is_stopped: bool
 
 

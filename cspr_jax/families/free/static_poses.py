@@ -37,7 +37,7 @@ def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame
     answers = proved_answers(planned_problem(problem), at_rest, scene)
     for i in range(len(at_rest)):
         rests = not (poses.accelerations[i].any() or poses.velocities[i].any())
-        causes = answers.proved_causes(i, frame) if answers.proof[i].broken.any() else ()
+        causes = answers.causes_of(i, frame) if answers.proof[i].broken.any() else ()
         for cause in causes:
             if rests or Verdict[cause.criterion.upper()] & OF_PLACES:
                 return i, dataclasses.replace(cause, t=np.nan)

@@ -36,15 +36,10 @@ class LineAnswers(Answers):
     active: np.ndarray
     names: tuple[str, ...] = ()
 
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether each line is proved feasible, (n,)."""
-        return self.verdict == 0
-
     def details(self, i: int) -> dict[str, Any]:
         """Details of a segment; see `Answers.details`."""
         active = dict.fromkeys(self.names[k - 1] for k in self.active[i] if k > 0)
-        return {
+        return super().details(i) | {
             "acceleration_time": float(self.acceleration_time[i]),
             "active": list(active),
             "least_duration": float(self.least_duration[i]),
@@ -81,6 +76,7 @@ def timed_lines(
         np.where(moves, timings.lower_bound, np.nan),
         np.stack([np.where(moves, x + 1, 0) for x in (timings.up, timings.down)], axis=1),
         names_of(problem.robot, problem.limits),
+        margin_unit="m/s^2",
     )
 
 

@@ -15,11 +15,11 @@ from cspr_jax.families.paths.least_time.least_time import LeastTime
 from cspr_jax.families.paths.least_time.refusals import NoMotion
 from cspr_jax.families.paths.least_time.static_tension import StaticTension
 from cspr_jax.families.paths.least_time.tightening import BindingName
+from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.cause import Cause
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
-from cspr_jax.verification.proved_answers import ProvedAnswers
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -175,7 +175,7 @@ def _shown(value: float) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class PathAnswers(ProvedAnswers):
+class PathAnswers(Answers):
     """Answers of segments of paths.
 
     Fields:
@@ -215,9 +215,9 @@ class PathAnswers(ProvedAnswers):
             f"{key} = {_shown(missing[0].ramp_time)} s: no ramps of that length were found{where}: {'; '.join(words)}"
         ]
 
-    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
-        """Places that no path speed passes, then what no other speed mends; see `Answers.proved_causes`."""
-        usual, places, before = super().proved_causes(i, frame), list[Cause](), 0.0
+    def causes_of(self, i: int, frame: Frame) -> tuple[Cause, ...]:
+        """Places that no path speed passes, then what no other speed mends; see `Answers.causes_of`."""
+        usual, places, before = super().causes_of(i, frame), list[Cause](), 0.0
         for section in self.sections[i]:
             times, failure = section.times(i), section.least.failure
             if failure is not None:

@@ -8,9 +8,10 @@ import numpy as np
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.least_time import LeastTime, least_times_along
+from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
-from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.verification.proved_answers import proved_answers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +27,7 @@ class PathTimes:
         sections: (n,) for each path the motions along its sections.
     """
 
-    answers: ProvedAnswers
+    answers: Answers
     duration: np.ndarray
     lower_bound: np.ndarray
     motions: list[Spline]

@@ -52,7 +52,7 @@ class PlatformMotionAnswers(Answers):
     def details(self, i: int) -> dict[str, Any]:
         """Determinant, contacts and beta-hat; see `Answers.details`."""
         verdict, has_determinant = Verdict(int(self.verdict[i])), not np.isnan(self.det_margin[i])
-        return {
+        return super().details(i) | {
             "det_sign_constant": bool(self.det_margin[i] > 0.0) if has_determinant else None,
             "det_margin": float(self.det_margin[i]),
             "cable_interference": bool(verdict & Verdict.CABLE_CABLE),

@@ -6,6 +6,7 @@ affine bounds.
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -53,6 +54,14 @@ def backwards(state: StateBounds) -> StateBounds:
     rates = ("velocity", "angular_velocity")
     changed = {name: -bounds if name in rates else bounds for name, bounds in state._asdict().items() if bounds}
     return StateBounds(**{name: bounds._replace(linear=-bounds.linear) for name, bounds in changed.items()})
+
+
+def at_rest(state: StateBounds) -> StateBounds:
+    """Bounds of the same poses without a motion."""
+    poses = ("position", "rotation")
+    changed = {name: bounds for name, bounds in state._asdict().items() if bounds is not None}
+    still = {name: jax.tree.map(np.zeros_like, bounds) for name, bounds in changed.items() if name not in poses}
+    return state._replace(**still)
 
 
 class CableBounds(NamedTuple):

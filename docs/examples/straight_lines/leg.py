@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from cspr_jax.motion.leg import Leg
-from cspr_jax.verification.sampled import sampled_answers
+from cspr_jax.verification.proved_answers import proved_answers
 from straight_lines.motion import Line
 
 
@@ -16,4 +16,4 @@ class Lines(Leg):
         """Return answers and motions; samples refute, and prove nothing."""
         points = self.waypoints.points(z0)
         motions = [Line(start, end, np.asarray(z0)) for start, end in itertools.pairwise(points)]
-        return sampled_answers(problem, motions), motions
+        return proved_answers(problem, motions), motions

@@ -65,7 +65,7 @@ class OscillationAnswers(Answers):
 
     def details(self, i: int) -> dict[str, Any]:
         """Numbers of oscillations; see `Answers.details`."""
-        return {
+        return super().details(i) | {
             "oscillations": int(self.arcs[i]) // 2 or None,
             "tried_oscillations": int(self.tried_oscillations[i]),
             "envelope_oscillations": int(self.envelope_oscillations[i]) or None,

@@ -15,7 +15,7 @@ from cspr_jax.outputs.plots.robots.robot_at import hull_of
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.outputs.plots.style.labels import WRITTEN, cable_names, margin_unit
 from cspr_jax.outputs.plots.style.word_ticks import FEASIBLE_COLOUR, REASONS
-from cspr_jax.plans.causes import cause_text
+from cspr_jax.outputs.segment_causes import cause_text
 from cspr_jax.robots.model.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
