@@ -129,9 +129,11 @@ class MotionProof(NamedTuple):
         if not chosen:
             return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
         worst = {self.criteria[k].flag: k for k in reversed(chosen)}
-        named = list(dict.fromkeys(self.criteria[k].flag for k in chosen))
-        # Tensions grow without bound towards the plane of the spools.
-        unbounded = [flag for flag in named if flag & TENSIONS and Verdict.ABOVE_SPOOLS in named]
+        named, unbounded = list(dict.fromkeys(self.criteria[k].flag for k in chosen)), list[Verdict]()
+        if Verdict.ABOVE_SPOOLS in worst:
+            # Where the spools are passed is told first: tensions grow without bound towards their plane.
+            named.sort(key=lambda flag: flag != Verdict.ABOVE_SPOOLS)
+            unbounded = [flag for flag in named if flag & TENSIONS]
         bounded = [flag for flag in named if flag not in unbounded]
         return (*(cause_of(self, worst[flag], frame) for flag in bounded), *(Cause(flag.text) for flag in unbounded))
 
