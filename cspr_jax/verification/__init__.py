@@ -5,10 +5,8 @@ Slacks of criteria are bounded over blocks of time (`bounds`), which are halved 
 
 Files, each importing only from those above it:
 
-    needs             what a motion needs at its worst instants, and what is allowed
     fewest_limits     the limit that alone refuses a motion
     proved_verdicts   verdicts that rest on a proof
-    sampled           answers of motions that are only sampled
     criteria          criteria of any motion
     bounds            bounds of motions over blocks of time
     time_proof        proof of criteria over the whole time of a motion, or of several

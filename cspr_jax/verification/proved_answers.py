@@ -131,7 +131,7 @@ class MotionProof(NamedTuple):
         worst = {self.criteria[k].flag: k for k in reversed(chosen)}
         named, unbounded = list(dict.fromkeys(self.criteria[k].flag for k in chosen)), list[Verdict]()
         if Verdict.ABOVE_SPOOLS in worst:
-            # Where the spools are passed is told first: tensions grow without bound towards their plane.
+            # The spools come first: tensions grow without bound towards their plane.
             named.sort(key=lambda flag: flag != Verdict.ABOVE_SPOOLS)
             unbounded = [flag for flag in named if flag & TENSIONS]
         bounded = [flag for flag in named if flag not in unbounded]
