@@ -52,7 +52,7 @@ def build_problem(
     """Robot, limits and amplitude function of a plan or sweep, as the kernels take them."""
     amplitude = build_amplitude(spec, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     limit_values = build_limits(robot_file, limits, file)
-    pulleys = pulleys or all(FAMILIES[name].knows_pulleys for name in spec.families)
+    pulleys = pulleys or all(FAMILIES[name].proof == "any" for name in spec.families)
     robot = kernel_robot(robot_file, spec, file, any_cables=any_cables, pulleys=pulleys)
     try:
         if not is_redundant_platform(robot):

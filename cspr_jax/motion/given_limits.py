@@ -88,12 +88,12 @@ def check_certain(
     uncertainty = limits.uncertainty
     if uncertainty is None:
         return
-    names = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
+    names = [row.name for row in FAMILIES.values() if row.proof != "own"]
     if not families or not set(families) <= set(names):
         raise InputError(
             "uncertainty", None, f"must be absent but for the families {', '.join(names)}", problem="given"
         )
-    is_redundant = robot.n_cables != robot.dof and not all(FAMILIES[name].uncertain_redundancy for name in families)
+    is_redundant = robot.n_cables != robot.dof and any(FAMILIES[name].proof != "any" for name in families)
     if is_redundant or in_pairs or robot.pulleys is not None:
         allowed = "must be absent on redundant cables (but for splines), on pairs of cables, and with pulleys"
         raise InputError("uncertainty", None, allowed, problem="given")

@@ -87,9 +87,8 @@ class JudgedLeg(Leg):
 
 def judged(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
     """A leg whose verdicts take surroundings and pulleys into account."""
-    row = FAMILIES[leg.waypoints.family]
-    is_known = (row.knows_obstacles or not surroundings) and (row.knows_pulleys or not pulleys)
-    return leg if is_known else JudgedLeg(leg)
+    is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (surroundings or pulleys)
+    return JudgedLeg(leg) if is_needed else leg
 
 
 def _from_points(problem: Problem) -> Problem:

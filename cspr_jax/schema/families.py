@@ -11,6 +11,14 @@ from typing import Any
 
 from cspr_jax.schema.plugins import ExtensibleRows
 
+# What answers of a family can rest on. Its own proofs are faster, and take cables for lines from points: plans
+# prove its motions once more, as any motion, where there are pulleys or bodies that can meet.
+PROOFS = {
+    "any": "the proof of any motion, which knows pulleys, bodies that can meet, and uncertainties",
+    "robust": "one of its own, which knows uncertainties on as many cables as degrees of freedom",
+    "own": "one of its own, without uncertainties",
+}
+
 
 @dataclasses.dataclass(frozen=True)
 class Family:
@@ -30,11 +38,7 @@ class Family:
         keys: keys of a plan that only this family takes, and others that name them too.
         pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
         end_keys: likewise, if it leads to the pose or from it.
-        knows_uncertainty: whether its verdicts take all of an uncertainty into account.
-        uncertain_redundancy: whether they do so on more cables than degrees of freedom, too.
-        knows_obstacles: whether its own verdicts take obstacles and the shape of the platform into account; if not,
-            its motions are judged once more in plans.
-        knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
+        proof: what its answers rest on, a row of `PROOFS`.
         is_searched: whether its motions are searched for, also from those of other families.
         begins_searches: whether such searches begin from its motions: where they find nothing else, or nothing fast.
         precedes_searches: whether they do so at once, and their motions are never slower than its motions.
@@ -51,10 +55,7 @@ class Family:
     keys: tuple[str, ...] = ()
     pose_keys: tuple[str, ...] = ()
     end_keys: tuple[str, ...] = ()
-    knows_uncertainty: bool = False
-    uncertain_redundancy: bool = False
-    knows_obstacles: bool = False
-    knows_pulleys: bool = False
+    proof: str = "own"
     is_searched: bool = False
     begins_searches: bool = False
     precedes_searches: bool = False
@@ -78,7 +79,7 @@ _ROWS = (
             "3R3T": "cspr_jax.families.platforms.leg:StandardPoses",
         },
         any_cables=("3T", "3R3T"),
-        knows_uncertainty=True,
+        proof="robust",
         begins_searches=True,
     ),
     Family(
@@ -87,7 +88,7 @@ _ROWS = (
         dict.fromkeys(("2T", "3T"), "cspr_jax.families.swings.transitions.transition_leg:Transitions"),
         free_end=True,
         any_cables=("2T", "3T"),
-        knows_uncertainty=True,
+        proof="robust",
         begins_searches=True,
     ),
     Family(
@@ -95,7 +96,7 @@ _ROWS = (
         "hypocycloids of variable amplitude, for platforms (thesis chapter 3)",
         {"3R3T": "cspr_jax.families.platforms.leg:VariablePoses"},
         any_cables=("3R3T",),
-        knows_uncertainty=True,
+        proof="robust",
         begins_searches=True,
     ),
     *(
@@ -133,10 +134,7 @@ _ROWS = (
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=ANY_PATTERN,
-        knows_uncertainty=True,
-        uncertain_redundancy=True,
-        knows_obstacles=True,
-        knows_pulleys=True,
+        proof="any",
         keys=("motion", "trajectory", "interpolation", "ends", "smooth", "stretch"),
         pose_keys=("motion", "trajectory"),
         end_keys=("time", "velocity", "acceleration"),
@@ -147,10 +145,7 @@ _ROWS = (
         dict.fromkeys(("2T", "3T", "3R3T"), "cspr_jax.families.ellipses.leg:Ellipses"),
         rests_anywhere=True,
         any_cables=("2T", "3T", "3R3T"),
-        knows_uncertainty=True,
-        uncertain_redundancy=True,
-        knows_obstacles=True,
-        knows_pulleys=True,
+        proof="any",
         keys=("ellipse", "turns"),
         pose_keys=("turns",),
         end_keys=("ellipse",),
@@ -162,10 +157,7 @@ _ROWS = (
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=ANY_PATTERN,
-        knows_uncertainty=True,
-        uncertain_redundancy=True,
-        knows_obstacles=True,
-        knows_pulleys=True,
+        proof="any",
         begins_searches=True,
         precedes_searches=True,
         keys=("path",),
@@ -178,10 +170,7 @@ _ROWS = (
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=("1T", "2T", "3T", "1R2T", "3R3T"),
-        knows_uncertainty=True,
-        uncertain_redundancy=True,
-        knows_obstacles=True,
-        knows_pulleys=True,
+        proof="any",
         is_searched=True,
         keys=("objective", "duration_max", "end_accelerations", "together", "starts", "search_time"),
         end_keys=("velocity",),

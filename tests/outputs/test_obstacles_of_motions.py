@@ -50,7 +50,7 @@ def plan(tmp_path, monkeypatch):
     importlib.invalidate_caches()
     family = importlib.import_module("straight_lines")
     (tmp_path / "plan.toml").write_text(PLAN)
-    with registered(dataclasses.replace(family.FAMILY, knows_obstacles=True)):
+    with registered(dataclasses.replace(family.FAMILY, proof="any")):
         yield tmp_path / "plan.toml"
     for name in [name for name in sys.modules if name.partition(".")[0] == "straight_lines"]:
         sys.modules.pop(name)
