@@ -11,8 +11,8 @@ from typing import Any
 
 from cspr_jax.schema.plugins import ExtensibleRows
 
-# What answers of a family can rest on. Its own proofs are faster, and take cables for lines from points: plans
-# prove its motions once more, as any motion, where there are pulleys or bodies that can meet.
+# Proofs on which answers of a family can rest. Its own are faster, and take cables for lines from points: plans prove
+# its motions once more, as any motion, where there are pulleys or bodies that can meet.
 PROOFS = {
     "any": "the proof of any motion, which knows pulleys, bodies that can meet, and uncertainties",
     "robust": "one of its own, which knows uncertainties on as many cables as degrees of freedom",
