@@ -163,7 +163,7 @@ def test_whole_cells_and_the_volume_of_a_prism(tmp_path):
     found, path = volume_of(tmp_path, "coarse", axes.format(n=12, z=z), "prove = true")
     assert found.units == "m3" and found.axes == {} and found.undecided_fraction == 0.0
     assert abs(found.volume - 2.0) <= found.error
-    assert found.least <= 2.0 <= found.maximum and found.least > 1.2
+    assert found.least <= 2.0 <= found.most and found.least > 1.2
     with h5py.File(path) as file:
         side, x, y = file["cell_side"][...], file["x"][...], file["y"][...]
     half = 0.5 * (x[1] - x[0])
