@@ -78,7 +78,7 @@ class Answers(Columns):
         """Tell whether each segment is proved feasible, (n,); a smaller number of arcs may still be undecided."""
         return (self.verdict & ~FEWER) == 0
 
-    def rows(self: AnyAnswers, index: Bool[np.ndarray, "m"]) -> AnyAnswers:
+    def rows(self: AnyAnswers, index: Bool[np.ndarray, "m"] | Int[np.ndarray, "m"]) -> AnyAnswers:
         """Some of the answers."""
         return dataclasses.replace(self, **{name: values[index] for name, values in self.arrays().items()})
 

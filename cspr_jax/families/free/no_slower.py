@@ -36,7 +36,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.verification.proved_answers import proved_answers
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 
 BATCH = 128
@@ -182,7 +182,7 @@ def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion
     return dataclasses.replace(free, motions=motions, answers=answers, energy=energy, level=level, families=families)
 
 
-def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Float[np.ndarray, "n"]:
+def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Bool[np.ndarray, "n"]:
     """Tell whether lines are proved, short enough, and accelerate at the poses as is asked."""
     is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
     return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))

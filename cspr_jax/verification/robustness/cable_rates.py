@@ -57,7 +57,7 @@ def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np
 
 def rates_fail(
     enclosure: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
-) -> Float[np.ndarray, "k"]:
+) -> Bool[np.ndarray, "k"]:
     """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
 
     Spools are displaced along their rays, and across them in the direction of the velocity or the acceleration.

@@ -19,7 +19,7 @@ from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints, 
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 # Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
@@ -52,7 +52,7 @@ class Ending(NamedTuple):
     enough: float = np.inf
     of_task: np.ndarray = np.zeros(0, int)
 
-    def is_over(self, is_optimal: Float[np.ndarray, "l"]) -> bool:
+    def is_over(self, is_optimal: Bool[np.ndarray, "l"]) -> bool:
         """Tell whether searches end now."""
         time_now = time.monotonic()
         return time_now > self.until or (

@@ -181,7 +181,7 @@ class Certifier:
         return problem, (*motion_items, blocks.start, blocks.stop)
 
     def ranges(
-        self, blocks: Blocks, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]
+        self, blocks: Blocks, segments: PlatformSegment, arcs: Num[np.ndarray, "n"]
     ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
         """Ranges of the tensions on blocks."""
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
