@@ -3,10 +3,10 @@
 import jax
 import numpy as np
 import pytest
+from support.browsers import unpacked
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.pages.motions import motion_content
-from cspr_jax.outputs.plots.pages.page import unpacked
 from cspr_jax.outputs.plots.robots.robot_at import ON_ARC, cable_points
 from cspr_jax.robots.model.pulleys import exits
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.spatial.transform import Rotation
-from support.browsers import opened, shown, started
+from support.browsers import opened, shown, started, unpacked
 
 import cspr_jax
 from cspr_jax.cli import main
@@ -22,7 +22,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.plots.pages.maps import informative_cells, map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import motion_content
-from cspr_jax.outputs.plots.pages.page import packed, page_of, unpacked
+from cspr_jax.outputs.plots.pages.page import packed, page_of
 
 SWEEP = {
     "schema": 1,

@@ -1,7 +1,13 @@
 """A browser without a window, for tests of pages."""
 
+import base64
 import contextlib
+import gzip
 import shutil
+
+import numpy as np
+
+from cspr_jax.outputs.plots.pages.page import TYPES
 
 # The renderer is software, and the sandbox of a container's root is none.
 SWITCHES = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -47,3 +53,10 @@ def opened(path):
 
 def _is_own(address):
     return address.startswith(("file:", "data:", "blob:"))
+
+
+def unpacked(array):
+    """Values of a page's array, as a browser has them."""
+    name = next(name for name, other in TYPES.items() if other == array["type"])
+    data = gzip.decompress(base64.b64decode(array["data"]))
+    return np.frombuffer(data, np.dtype(name).newbyteorder("<"))

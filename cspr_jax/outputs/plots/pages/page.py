@@ -62,10 +62,3 @@ def packed(values: Num[np.ndarray, "..."]) -> dict[str, Any]:
     # The time of writing is left out, so that the same values are the same text.
     data = gzip.compress(np.ascontiguousarray(values, np.dtype(name).newbyteorder("<")).tobytes(), 6, mtime=0)
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
-
-
-def unpacked(array: dict[str, Any]) -> Num[np.ndarray, "n"]:
-    """Values of a page, as a browser has them."""
-    name = next(name for name, other in TYPES.items() if other == array["type"])
-    data = gzip.decompress(base64.b64decode(array["data"]))
-    return np.frombuffer(data, np.dtype(name).newbyteorder("<"))
