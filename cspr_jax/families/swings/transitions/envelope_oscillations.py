@@ -112,7 +112,7 @@ def _needed(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array
 
 
 def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
-    # Find where the two highest peaks of a sampled function lie, and the height of the first; samples are looked at one
+    # Find where the two highest peaks of a sampled function lie, and the height of the first; samples are taken one
     # after the other, since sorting them would cost five times as much.
     none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
     nowhere = jnp.zeros((), jnp.int32)
