@@ -37,7 +37,7 @@ class Distances(NamedTuple):
     current: np.ndarray
     current_spools: np.ndarray
 
-    def hold(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
+    def hold(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
         """Tell whether all distances stay positive within blocks, however spools move: proved."""
         far = spools[:, None]
         cosine = np.sqrt(np.maximum(1.0 - (far * self.sine) ** 2, 0.0))
