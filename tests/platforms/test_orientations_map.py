@@ -23,7 +23,7 @@ NEAR = ("x = 1.5b", "y = 1.5b")
 def test_tables_of_orientations(monkeypatch):
     """Cells of two places, with a coarse step and few arcs; options that do not belong are refused."""
     monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)
-    monkeypatch.setattr(chapter_3, "PLACES", {name: chapter_3.POSITIONS[name] for name in NEAR})
+    monkeypatch.setattr(chapter_3, "POSITIONS", {name: chapter_3.POSITIONS[name] for name in NEAR})
     check_tables(monkeypatch)
     code, _, err = cspr("table", "2.1", "--fine")
     assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"

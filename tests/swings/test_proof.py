@@ -341,7 +341,7 @@ def test_arithmetic_that_limits_share_is_done_once():
     operations = {}
     for limits in (NO_LIMITS, limits_of(LIMIT)):
         problem, groups = Problem(robot, limits, QUINTIC), criteria.counts(robot, limits)
-        look = jax.jit(proof._first_look.__wrapped__).lower(problem, *table, (segments, p))
+        look = jax.jit(proof._first_pass.__wrapped__).lower(problem, *table, (segments, p))
         functions = margins.Functions(criteria.smooth_slacks, groups)
         minima = jax.jit(margins._minima.__wrapped__, static_argnames="functions")
         lowered = look, minima.lower(functions, problem, *table, 1.0, (segments, p))
