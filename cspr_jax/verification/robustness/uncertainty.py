@@ -204,7 +204,7 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 @UNKNOWN
 def holds(
     enclosure: Enclosure, influence: Influence, requirements: Requirements, multiple: Float[np.ndarray, "k"]
-) -> Float[np.ndarray, "k"]:
+) -> Bool[np.ndarray, "k"]:
     """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks."""
     radii = _radii(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
