@@ -15,7 +15,7 @@ Files, each importing only from those above it:
     feeds             proof of largest speeds that hold over some pieces of a motion alone
     proved_answers    answers of motions that give bounds of their states
     attained          smallest slacks that proved motions attain, and when
+    smallest_proved   smallest numbers whose motions are proved, of many motions at once
     judged            motions of families that know neither surroundings nor pulleys, judged with both
     time_stretching   the least uniform stretching of time that is feasible
-    proved            summaries of proofs of motions
 """

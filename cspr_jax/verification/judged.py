@@ -19,14 +19,13 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
+from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
 
 if TYPE_CHECKING:
     from jaxtyping import Num
 
 # Gives answers and motions of some segments, by their numbers, with numbers of arcs: those of `Waypoints.arcs`.
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
-UNSURE = FLAGS(Verdict.UNDECIDED | Verdict.FEWER_ARCS_UNDECIDED)
-FEWER = FLAGS(Verdict.FEWER_ARCS_UNDECIDED)
 
 
 class JudgedSegments(NamedTuple):
@@ -73,26 +72,29 @@ class Judge(NamedTuple):
         trial = self._trial(*join(np.arange(len(arcs)), arcs), self.intervals)
         answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
         verdict, is_free = trial.verdict.copy(), (arcs == 0) & (step * max_arcs > 0)
-        doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNSURE != 0)
+        doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNDECIDED != 0)
         # Over pulleys the family's choice says nothing.
         rows = np.flatnonzero(is_free & (self.has_pulleys | (answers.feasible & (verdict != 0))))
         minimum = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
-        none = np.zeros(len(arcs), bool)
-        none[rows] = True
-        while True:
-            rows, minimum = rows[minimum <= max_arcs], minimum[minimum <= max_arcs]
-            if not len(rows):
-                break
-            trial = self._trial(*join(rows, minimum if self.has_pulleys else -minimum), intervals=False)
-            doubtful[rows] |= (trial.verdict | (0 if self.has_pulleys else trial.answers.verdict)) & UNSURE != 0
+
+        def further(index: np.ndarray, lower: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            nonlocal answers
+            rows_tried = rows[index]
+            trial = self._trial(*join(rows_tried, lower if self.has_pulleys else -lower), intervals=False)
+            unsure = (trial.verdict | (0 if self.has_pulleys else trial.answers.verdict)) & UNDECIDED
+            doubtful[rows_tried] |= unsure != 0
             proved = np.flatnonzero(trial.verdict == 0)
-            done = rows[proved]
-            answers = replaced(answers, done, trial.answers, proved)
-            for i, k in zip(done.tolist(), proved.tolist(), strict=True):
+            answers = replaced(answers, rows_tried[proved], trial.answers, proved)
+            for i, k in zip(rows_tried[proved].tolist(), proved.tolist(), strict=True):
                 proofs[i] = trial.proofs[k]
-            arcs[done], verdict[done], none[done] = trial.answers.tried_arcs[proved], 0, False
-            goes_on = (trial.verdict != 0) & (self.has_pulleys | trial.answers.feasible)
-            rows, minimum = rows[goes_on], (minimum if self.has_pulleys else trial.answers.tried_arcs)[goes_on] + step
+            tried = lower if self.has_pulleys else np.where(trial.answers.feasible, trial.answers.tried_arcs, NONE)
+            return tried, np.where(trial.verdict == 0, 0, trial.verdict | Verdict.NO_ARCS)
+
+        smallest = smallest_proved(further, minimum, step=step, last=max_arcs).number
+        is_none, done = smallest == NONE, rows[smallest != NONE]
+        arcs[done], verdict[done] = smallest[~is_none], 0
+        none = np.zeros(len(arcs), bool)
+        none[rows[is_none]] = True
         if self.has_pulleys and not max_arcs:  # the family has refuted smaller numbers for cables from points
             doubtful |= (arcs == 0) & (answers.tried_arcs > max(step, 1))
         verdict = np.where(none, np.where(doubtful, Verdict.UNDECIDED, verdict | FLAGS(Verdict.NO_ARCS)), verdict)

@@ -76,6 +76,16 @@ class MotionProof(NamedTuple):
             return flags
         return Verdict.UNDECIDED
 
+    @property
+    def margin(self) -> float:
+        """Upper bound of the smallest margin of tensions, N."""
+        return self.least(self.proof.high, TENSIONS)
+
+    @property
+    def margin_bound(self) -> float:
+        """Lower bound of the smallest margin of tensions, N."""
+        return self.least(self.proof.low, TENSIONS)
+
     def least(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
         """Smallest of the bounds of some criteria."""
         chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
@@ -249,8 +259,8 @@ def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) 
 def margins_of(proofs: Sequence[MotionProof]) -> dict[str, np.ndarray]:
     """Margins of proofs."""
     return {
-        "margin": np.array([case.least(case.proof.high, TENSIONS) for case in proofs]),
-        "margin_bound": np.array([case.least(case.proof.low, TENSIONS) for case in proofs]),
+        "margin": np.array([case.margin for case in proofs]),
+        "margin_bound": np.array([case.margin_bound for case in proofs]),
         "limit_margin": np.array([case.least(case.proof.high, TENSIONS, others=True) for case in proofs]),
     }
 

@@ -26,7 +26,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.proved import ProofSummary
+from cspr_jax.verification.proved_answers import proof_of
 
 EXAMPLE = example_files.folder() / "cogiro.toml"
 LOW, HIGH, GRAVITY = 100.0, 5000.0, 9.81
@@ -131,8 +131,12 @@ def test_the_motion_of_a_plan_is_proved_to_its_margin(example):
 def test_what_no_proof_closes_is_undecided(monkeypatch):
     """Samples alone make no motion feasible."""
     keys = FIXED | {"pose": [{"rest": True}, POSE]}
-    unproved = ProofSummary(Verdict.UNDECIDED.value, 9.0, -1.0, np.inf, np.nan)
-    monkeypatch.setattr(redundant_checker, "proved", lambda problem, motion: unproved)
+
+    def unproved(problem, motion):
+        full = proof_of(problem, motion)
+        return full._replace(proof=dataclasses.replace(full.proof, low=np.full_like(full.proof.low, -1.0)))
+
+    monkeypatch.setattr(redundant_checker, "proof_of", unproved)
     planned = cspr_jax.plan(keys)
     assert planned.answers.verdict.tolist() == [Verdict.UNDECIDED.value] and not planned.feasible
     assert planned.answers.margin_bound[0] < 0.0

@@ -22,8 +22,8 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import centred
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved import summary
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of
 from cspr_jax.verification.proved_verdicts import Verdicts
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 # Segments that are proved together, and the largest margin over the weight a cable that counts for searches: on cables
 # that tighten each other without largest tensions it has no bound.
 TOGETHER, LARGEST = 64, 1e6
+LIMIT_FLAGS = [row.flag for row in LIMITS if row.quantity != "tension"]
 
 
 def proofs(problem: Problem, motions: Bezier, *, at_rest: bool = False) -> list[MotionProof]:
@@ -59,9 +60,16 @@ def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, Fl
     each = np.empty(count, object)
     each[valid] = proofs(problem, jax.tree.map(lambda x: x[valid], motions))
     for i in valid.tolist():
-        short = summary(each[i], float(motions.z0[i]))
-        verdict[i], margin[i], bound[i], limit_margin[i] = short.verdict, short.margin, short.bound, short.room
+        verdict[i], margin[i], bound[i] = each[i].verdict, each[i].margin, each[i].margin_bound
+        limit_margin[i] = _limit_slack(each[i], float(motions.z0[i]))
     return Verdicts(verdict, margin, bound, limit_margin), each
+
+
+def _limit_slack(proof: MotionProof, z0: float) -> float:
+    # Smallest slack of the limits beside those of tensions, over their values, of the floor over z0.
+    slacks = zip(proof.criteria, proof.proof.high.tolist(), strict=True)
+    each = (slack / (row.allowed if row.cables else z0) for row, slack in slacks if row.flag in LIMIT_FLAGS)
+    return min(each, default=np.inf)
 
 
 def slacks_at(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:

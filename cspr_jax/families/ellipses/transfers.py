@@ -14,6 +14,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
+from cspr_jax.verification.smallest_proved import NONE, smallest_proved
 
 # Intervals of the samples that refute most motions before a proof is tried.
 FEW = 256
@@ -122,21 +123,24 @@ def smallest_transfer(
     problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
 ) -> Transfer:
     """The transfer with the smallest number of arcs that is proved, with the turns after it."""
-    step = step_of(first, last)
-    undecided: Transfer | None = None
-    refuted: list[tuple[float, Transfer]] = []
-    for number in [arcs] if arcs or not step else range(step, max_arcs + 1, step):
+    step, transfers = step_of(first, last), dict[int, Transfer]()
+
+    def trial(_: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        number = int(numbers[0])
         motion = motion_between(problem.amplitude, first, last, number, turns)
         proof = sampled_proof(problem, motion, scene, FEW)
         if not proof.broken.any():
             proof = proof_of(problem, motion, scene)
-            if not proof.verdict:
-                return Transfer(motion, proof, number, undecided is not None)
-            if not proof.broken.any():
-                undecided = undecided or Transfer(motion, proof, number)
-        refuted.append((float((proof.proof.high / proof.scales).min()), Transfer(motion, proof, number)))
-    if undecided is not None:
-        return undecided
-    best = max(refuted, key=lambda each: each[0])[1]
+        transfers[number] = Transfer(motion, proof, number)
+        return numbers, np.array([proof.verdict])
+
+    lowest, highest = (step, max_arcs) if step and not arcs else (arcs, arcs)
+    smallest = smallest_proved(trial, np.array([lowest]), step=max(step, 1), last=highest)
+    number, undecided = int(smallest.number[0]), int(smallest.undecided[0])
+    if number != NONE:
+        return transfers[number]._replace(fewer_undecided=undecided != NONE)
+    if undecided != NONE:
+        return transfers[undecided]
+    best = max(transfers.values(), key=lambda each: float((each.proof.proof.high / each.proof.scales).min()))
     # A motion that samples have refuted is bounded for its causes.
     return best._replace(proof=proof_of(problem, best.motion, scene))

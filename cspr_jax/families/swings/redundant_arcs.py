@@ -3,14 +3,14 @@
 The motion is that of three cables. With gravity / z0 = lambda, a pendulum's acceleration -lambda (p - P0) needs a force
 from p towards the centroid of the spools, which lies between them, so that below the spools tensions can supply it; the
 other terms fade with the number of arcs. What is tried in increasing order is refuted by samples, or else proved over
-its whole time (`verification.proved`). Margins are distances of all tensions from their limits, over the weight per
-cable.
+its whole time (`verification.proved_answers`). Margins are distances of all tensions from their limits, over the weight
+per cable.
 """
 
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -29,7 +29,8 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import centred
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved import proved
+from cspr_jax.verification.proved_answers import proof_of
+from cspr_jax.verification.smallest_proved import NONE, smallest_proved
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
@@ -39,16 +40,6 @@ FEW = 4  # samples an arc, to begin with
 MANY = 32  # before a proof
 # Slacks that are not those of limits: of the tensions, and of the depth below the spools.
 BASIC = 2
-
-
-class _Trials(NamedTuple):
-    # Numbers of arcs proved feasible (n,), smaller ones that stayed undecided, proved margins, and of those that fail
-    # the ones with the largest sampled slack, with this slack.
-    arcs: np.ndarray
-    undecided: np.ndarray
-    bound: np.ndarray
-    best: np.ndarray
-    reached: np.ndarray
 
 
 @jax.jit
@@ -81,31 +72,29 @@ def redundant_arcs(
     count = len(infinity)
     only = np.zeros(count, int) if arcs is None else np.asarray(arcs)
     nothing = np.full(count, np.nan)
-    trials = _Trials(np.zeros(count, int), np.zeros(count, int), nothing.copy(), only.copy(), np.full(count, -np.inf))
-    trials.best[only <= 0] = np.maximum(-only, step)[only <= 0]
-    for number in range(step, max(max_arcs, int(only.max(initial=0))) + 1, step):
-        is_tried = np.where(only > 0, only == number, (-only <= number) & (number <= max_arcs)) & (trials.arcs == 0)
-        if is_tried.any():
-            stage(f"arcs {number} of {max_arcs}")
-            _try(problem, parities, np.flatnonzero(is_tried), number, trials)
-    tried = np.where(trials.arcs > 0, trials.arcs, np.where(trials.undecided > 0, trials.undecided, trials.best))
+    trials, last = _Trials(problem, parities, count), np.where(only > 0, only, max_arcs)
+    first = np.where(only > 0, only, -(-np.maximum(-only, step) // step) * step)
+    smallest = smallest_proved(trials, first, step=step, last=last)
+    is_found, is_undecided = smallest.number != NONE, smallest.undecided != NONE
+    best = np.where(np.isfinite(trials.slack), trials.best, np.maximum(only, np.maximum(-only, step)))
+    tried = np.where(is_found, smallest.number, np.where(is_undecided, smallest.undecided, best))
     chosen = pick(parities, np.arange(count), tried)
     measured = partial(_measured, segments=chosen, tried=tried)
-    minimum, refused = measured(problem, rows=np.arange(count)), np.flatnonzero(trials.arcs == 0)
+    minimum, refused = measured(problem, rows=np.arange(count)), np.flatnonzero(~is_found)
     flags = (Verdict.WRENCH_INFEASIBLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in other_limits(problem.limits)))
     broken = np.zeros(count, int)
     is_broken = measured(touchable(problem), rows=refused) <= 0.0
     broken[refused] = np.bitwise_or.reduce(np.where(is_broken, [flag.value for flag in flags], 0), axis=1)
-    none = np.where(trials.undecided > 0, Verdict.UNDECIDED.value, broken | Verdict.NO_ARCS.value)
-    fewer = np.where(trials.undecided > 0, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    none = np.where(is_undecided, Verdict.UNDECIDED.value, broken | Verdict.NO_ARCS.value)
+    fewer = np.where(is_undecided, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     duration = np.array([float(_motion(problem, chosen, i, int(tried[i])).duration()) for i in range(count)])
     answers = Answers(
-        arcs=trials.arcs,
+        arcs=np.where(is_found, smallest.number, 0),
         tried_arcs=tried,
-        verdict=np.where(trials.arcs > 0, fewer, none).astype(FLAGS),
+        verdict=np.where(is_found, fewer, none).astype(FLAGS),
         duration=duration,
         margin=minimum[:, 0],
-        margin_bound=trials.bound,
+        margin_bound=np.array([trials.bounds.get((i, k), np.nan) for i, k in enumerate(tried.tolist())]),
         limit_margin=minimum[:, BASIC:].min(1, initial=np.inf),
         feasible_at_infinity=infinity,
         tolerated=nothing,
@@ -120,23 +109,39 @@ def _measured(problem: Problem, *, segments: Segment, tried: np.ndarray, rows: n
     return np.concatenate([np.empty((0, BASIC + len(other_limits(problem.limits)))), *each])
 
 
-def _try(problem: Problem, parities: dict[int, Segment], rows: np.ndarray, number: int, trials: _Trials) -> None:
-    # Try a number of arcs for some of the segments.
-    segments = parities[number % 2]
-    for samples in (FEW, MANY):
-        minimum = least_slacks(touchable(problem), segments, rows, number, samples).min(1)
-        better = minimum > trials.reached[rows]
-        trials.best[rows[better]], trials.reached[rows[better]] = number, minimum[better]
-        rows = rows[minimum > 0.0]
-        if not len(rows):
-            return
-    weight = float(problem.robot.mass * problem.robot.gravity) / problem.robot.n_cables
-    for i in rows.tolist():
-        proof = proved(problem, _motion(problem, segments, i, number))
-        if proof.verdict == Verdict.FEASIBLE or (proof.verdict == Verdict.UNDECIDED and trials.undecided[i] == 0):
-            trials.bound[i] = proof.bound / weight
-            column = trials.arcs if proof.verdict == Verdict.FEASIBLE else trials.undecided
-            column[i] = number
+class _Trials:
+    # Trials of numbers of arcs, with the proved margin of each that is not refuted, and of those that fail the number
+    # with the largest sampled slack.
+
+    def __init__(self, problem: Problem, parities: dict[int, Segment], count: int) -> None:
+        self._problem, self._parities = problem, parities
+        self.bounds = dict[tuple[int, int], float]()
+        self.best, self.slack = np.zeros(count, int), np.full(count, -np.inf)
+
+    def __call__(self, index: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        verdict = np.full(len(index), Verdict.NO_ARCS.value)
+        for number in np.unique(numbers).tolist():
+            stage(f"arcs {number}")
+            verdict[numbers == number] = self._verdicts(index[numbers == number], number)
+        return numbers, verdict
+
+    def _verdicts(self, index: np.ndarray, number: int) -> np.ndarray:
+        segments, verdict = self._parities[number % 2], np.full(len(index), Verdict.NO_ARCS.value)
+        remaining = np.arange(len(index))
+        for samples in (FEW, MANY):
+            if not len(remaining):
+                return verdict
+            chosen = index[remaining]
+            minimum = least_slacks(touchable(self._problem), segments, chosen, number, samples).min(1)
+            better = minimum > self.slack[chosen]
+            self.best[chosen[better]], self.slack[chosen[better]] = number, minimum[better]
+            remaining = remaining[minimum > 0.0]
+        weight = float(self._problem.robot.mass * self._problem.robot.gravity) / self._problem.robot.n_cables
+        for k in remaining.tolist():
+            proof = proof_of(self._problem, _motion(self._problem, segments, int(index[k]), number))
+            verdict[k] = proof.verdict.value
+            self.bounds[int(index[k]), number] = proof.margin_bound / weight if not proof.broken.any() else np.nan
+        return verdict
 
 
 def _motion(problem: Problem, segments: Segment, i: int, number: int) -> Hypocycloid:

@@ -4,9 +4,9 @@ Motion and limits leave a choice of tensions. The margin at a time is the margin
 the pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
 the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
 supply the wrench there is no s. Searches take samples, finer where it matters; what they choose is then proved, by
-tensions that balance the motion throughout blocks of time (`verification.proved`), and so is that cables, thick ones
-too, do not touch each other. Contacts with the platform are checked where its attachment points lie in a plane, or a
-plan gives its shape.
+tensions that balance the motion throughout blocks of time (`verification.proved_answers`), and so is that cables, thick
+ones too, do not touch each other. Contacts with the platform are checked where its attachment points lie in a plane, or
+a plan gives its shape.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.numerics.tolerances import SAMPLES_UNDECIDED
 from cspr_jax.robots.model.platform import separate_pairs
 from cspr_jax.schema.verdicts import Verdict, conjunction
-from cspr_jax.verification.proved import proved
+from cspr_jax.verification.proved_answers import proof_of
 from cspr_jax.workspaces.poses import exact
 from cspr_jax.workspaces.requirements import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
@@ -180,11 +180,13 @@ class RedundantChecker(MotionChecker):
         for i in np.flatnonzero(checks.verdict == 0).tolist():
             segment, count = jax.tree.map(lambda x: x[0], motions.items(np.array([i])))
             motion = PlatformMotion(segment, self.problem.amplitude, count, self.kind)
-            proof = proved(self.problem, motion)
-            checks.verdict[i], checks.bound[i] = proof.verdict, proof.bound / self._weight
+            proof = proof_of(self.problem, motion)
+            checks.verdict[i], checks.bound[i] = proof.verdict, proof.margin_bound / self._weight
             checks.slack[i, 0] = np.fmin(checks.slack[i, 0], proof.margin / self._weight)
-            checks.gap[i] = np.fmin(checks.gap[i], proof.clearance + self._diameter)
-            checks.refuted_tau[i] = proof.instant / float(motion.duration())
+            clearance = proof.least(proof.proof.high, Verdict.CABLE_CABLE)
+            checks.gap[i] = np.fmin(checks.gap[i], clearance + self._diameter)
+            firsts = [float(intervals[0].mean()) for intervals in proof.proof.failing if len(intervals)]
+            checks.refuted_tau[i] = min(firsts, default=np.nan) / float(motion.duration())
         return checks
 
     def _at_samples(self, motions: Motions, full: bool, ignored: np.ndarray | None) -> PlatformChecks:
