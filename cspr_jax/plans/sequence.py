@@ -18,7 +18,7 @@ from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import frame_of
-from cspr_jax.plans.judged_legs import judged
+from cspr_jax.plans.verified_legs import verified
 from cspr_jax.schema.families import FAMILIES, moving
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class PlanLegs:
             plain = leg(Waypoints(robot_file, keys, path, frame, family, first, after))
             if FAMILIES[family].is_searched:
                 plain.begin_with(_others(plain.waypoints))
-            self.legs.append(_judged(plain))
+            self.legs.append(_verified(plain))
 
     def table(self, problem: Problem, depths: Float[np.ndarray, "n_depths"]) -> dict[str, np.ndarray]:
         """Feasibility, durations and margins for several depths of P0."""
@@ -67,9 +67,9 @@ class PlanLegs:
         }
 
 
-def _judged(leg: Leg) -> Leg:
+def _verified(leg: Leg) -> Leg:
     waypoints = leg.waypoints
-    return judged(
+    return verified(
         leg,
         surroundings=bool(waypoints.plan_file.obstacle_keys),
         pulleys=waypoints.robot_file.pulley_radius is not None,
@@ -82,7 +82,7 @@ def _others(waypoints: Waypoints) -> list[Leg]:
     for row in FAMILIES.values():
         if row.begins_searches and pattern in row.legs:
             with contextlib.suppress(ConfigError):  # of poses that the family does not join
-                legs.append(_judged(row.leg(pattern).for_searches(dataclasses.replace(waypoints, family=row.name))))
+                legs.append(_verified(row.leg(pattern).for_searches(dataclasses.replace(waypoints, family=row.name))))
     return legs
 
 

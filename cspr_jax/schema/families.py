@@ -34,7 +34,6 @@ class Family:
             function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         takes_amplitude: whether its motions follow the plan's amplitude function, and not a law of their own.
-        is_line: whether its motions are straight lines, in the least time of their law.
         keys: keys of a plan that only this family takes, and others that name them too.
         pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
         end_keys: likewise, if it leads to the pose or from it.
@@ -51,7 +50,6 @@ class Family:
     rests_anywhere: bool = False
     any_cables: tuple[str, ...] = ()
     takes_amplitude: bool = True
-    is_line: bool = False
     keys: tuple[str, ...] = ()
     pose_keys: tuple[str, ...] = ()
     end_keys: tuple[str, ...] = ()
@@ -107,7 +105,6 @@ _ROWS = (
             rests_anywhere=True,
             takes_amplitude=False,
             any_cables=("2T", "3T"),
-            is_line=True,
             begins_searches=name == "quintic",
             keys=("max_acceleration", *keys),
         )

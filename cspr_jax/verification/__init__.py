@@ -16,6 +16,6 @@ Files, each importing only from those above it:
     proved_answers    answers of motions that give bounds of their states
     attained          smallest slacks that proved motions attain, and when
     smallest_proved   smallest numbers whose motions are proved, of many motions at once
-    judged            motions of families that know neither surroundings nor pulleys, judged with both
+    verifier          motions of families that know neither pulleys nor bodies that can meet, proved with both
     time_stretching   the least uniform stretching of time that is feasible
 """

@@ -36,17 +36,17 @@ class MinimumArcsMap(PointMassMap):
         settings: dict[str, Any] = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
         if self._scene is None:
             return vars(minimum_arcs(self._problem, *points, **settings))
-        from cspr_jax.maps.clear_motions import (
-            clear_motions,
-        )  # with the proofs of any motion, as in `families.swings.arcs`
+        # Maps without obstacles need no proofs of any motion.
         from cspr_jax.verification.bounds.batch import MotionBatch
+        from cspr_jax.verification.verifier import Verifier
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, MotionBatch]:
             answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
             motions = Hypocycloid(segments, self._problem.amplitude, as_float64(answers.tried_arcs))
             return answers, MotionBatch(motions, answers.duration, batch_bounds)
 
-        return clear_motions(self._problem, self._scene, join, len(cells["z0"]), max_arcs=max_arcs)
+        verifier = Verifier(self._problem, self._scene, intervals=False)
+        return verifier.columns(join, len(cells["z0"]), max_arcs=max_arcs)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""

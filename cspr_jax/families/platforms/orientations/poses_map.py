@@ -59,8 +59,9 @@ class PosesMap(PlatformMap):
 
     def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
         # Return the columns among obstacles, by which a motion is proved as its plan is.
-        from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, which others need not
+        # Maps without obstacles need no proofs of any motion.
         from cspr_jax.verification.bounds.batch import MotionBatch
+        from cspr_jax.verification.verifier import Verifier
 
         kind = self._checker.kind._replace(from_rest=False)
 
@@ -72,8 +73,8 @@ class PosesMap(PlatformMap):
             each = PlatformMotion(segments, self._problem.amplitude, as_float64(answers.tried_arcs), kind)
             return answers, MotionBatch(each, answers.duration, partial(batch_bounds, kind=kind), orders=4)
 
-        maximum = self._keys.trajectory.max_arcs
-        return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=maximum)
+        verifier = Verifier(self._problem, self._scene, intervals=False)
+        return verifier.columns(join, len(motions.z0), max_arcs=self._keys.trajectory.max_arcs)
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
         # Return the poses at the starts, and the values of beta-hat there.

@@ -1,6 +1,6 @@
-"""Motions of families that know neither surroundings nor pulleys, judged with both, and smallest numbers of arcs so.
+"""Motions of families that know neither bodies that can meet nor pulleys, proved with both: smallest numbers of arcs.
 
-The family makes its motions as for cables from points and without surroundings. Among obstacles, or with the shape of a
+The family makes its motions as for cables from points that meet nothing. Among obstacles, or with the shape of a
 platform, contacts alone are then proved, since the family has proved the rest; over pulleys, everything is. Where
 numbers of arcs are free, larger ones are tried until the motion is proved.
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
 
 
-class JudgedSegments(NamedTuple):
+class VerifiedSegments(NamedTuple):
     """Answers of n segments.
 
     Fields:
@@ -49,8 +49,8 @@ class _Trial(NamedTuple):
     verdict: np.ndarray
 
 
-class Judge(NamedTuple):
-    """Judge of motions, beyond their family.
+class Verifier(NamedTuple):
+    """Verifier of motions, beyond their family.
 
     Fields:
         problem: its robot with pulleys, if it has some.
@@ -67,7 +67,7 @@ class Judge(NamedTuple):
         """Tell whether the robot has pulleys."""
         return self.problem.robot.pulleys is not None
 
-    def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> JudgedSegments:
+    def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> VerifiedSegments:
         """Smallest numbers of arcs whose motions are proved."""
         trial = self._trial(*join(np.arange(len(arcs)), arcs), self.intervals)
         answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
@@ -100,16 +100,22 @@ class Judge(NamedTuple):
         verdict = np.where(none, np.where(doubtful, Verdict.UNDECIDED, verdict | FLAGS(Verdict.NO_ARCS)), verdict)
         verdict = np.where(verdict == 0, np.where(doubtful, FEWER, answers.verdict & FEWER), verdict).astype(FLAGS)
         feasible = np.where(verdict & ~FEWER == 0, answers.tried_arcs, 0)
-        return JudgedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
+        return VerifiedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
+
+    def columns(self, join: Join, count: int, *, max_arcs: int, step: int = 1) -> dict[str, np.ndarray]:
+        """Columns of a map whose motions keep clear of obstacles, as the plan of each cell says."""
+        answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=step, max_arcs=max_arcs)
+        clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
+        return vars(answers) | {"clearance": clearance}
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
-        # Judge the motions of a family: without pulleys those that it proves.
-        is_judged = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)
-        rows, verdict = np.flatnonzero(is_judged), np.array(answers.verdict, FLAGS)
+        # Verify the motions of a family: without pulleys those that it proves.
+        is_verified = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)
+        rows, verdict = np.flatnonzero(is_verified), np.array(answers.verdict, FLAGS)
         proofs: list[MotionProof | None] = [None] * len(verdict)
         for i, proof in zip(rows.tolist(), self._proofs(motions, rows, intervals), strict=True):
             proofs[i], verdict[i] = proof, proof.verdict
-        verdict[~is_judged & (verdict & ~FEWER == 0)] = Verdict.NOT_FINITE
+        verdict[~is_verified & (verdict & ~FEWER == 0)] = Verdict.NOT_FINITE
         uncertainty: Any = self.problem.limits.uncertainty
         if uncertainty is not None and float(uncertainty.spool_positions) > 0.0:  # masses move no cable
             answers = self._for_all_robots(answers, motions, verdict, rows[verdict[rows] == 0])
@@ -124,7 +130,7 @@ class Judge(NamedTuple):
         return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
-        # Judge feasible motions for all robots within an uncertainty; the family has done so but for contacts.
+        # Verify feasible motions for all robots within an uncertainty; the family has done so but for contacts.
         proved, refuted = answers.tolerated.copy(), answers.not_tolerated.copy()
         for i in rows.tolist():
             ours = motion_tolerances(self.problem, motions[i], self.scene, contacts_alone=True)

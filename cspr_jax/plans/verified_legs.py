@@ -1,6 +1,6 @@
-"""Legs of families that know neither surroundings nor pulleys: each motion is judged with both once it is made.
+"""Legs of families that know neither surroundings nor pulleys: each motion is proved with both once it is made.
 
-See `verification.judged`. Where numbers of arcs are free, point masses take the smallest number that is proved, over
+See `verification.verifier`. Where numbers of arcs are free, point masses take the smallest number that is proved, over
 pulleys only those on as many cables as degrees of freedom. Without pulleys platforms do so in legs of one segment.
 Others keep the number that their family chooses.
 """
@@ -17,12 +17,12 @@ from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.verification.judged import Judge
 from cspr_jax.verification.proved_answers import MotionProof, margins_of
+from cspr_jax.verification.verifier import Verifier
 
 
-class JudgedLeg(Leg):
-    """Leg of a family, its motions judged with surroundings and pulleys; see `Leg`."""
+class VerifiedLeg(Leg):
+    """Leg of a family, its motions proved with surroundings and pulleys; see `Leg`."""
 
     def __init__(self, leg: Leg) -> None:
         """Keep the leg of the family."""
@@ -48,7 +48,7 @@ class JudgedLeg(Leg):
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
         waypoints, plain, prescribed = self.waypoints, _from_points(problem), self.waypoints.arcs
-        judge = Judge(
+        verifier = Verifier(
             problem,
             scene_of(
                 problem.robot,
@@ -70,14 +70,14 @@ class JudgedLeg(Leg):
             answers, motions = joined[key]
             return answers.rows(rows), [motions[i] for i in rows]
 
-        is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
+        is_determined, has_pulleys = robot.n_cables == robot.dof, verifier.has_pulleys
         is_searched = is_determined or not has_pulleys
         if waypoints.robot_file.is_platform:  # whose motion depends on those before and behind it
             is_searched = not has_pulleys and len(self) == 1
         maximum = waypoints.max_arcs if is_searched else 0
-        judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
-        motions = join(np.arange(len(self)), judged.arcs)[1]
-        return _answers(judged.answers, judged.proofs, has_pulleys=has_pulleys), motions
+        verified = verifier.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
+        motions = join(np.arange(len(self)), verified.arcs)[1]
+        return _answers(verified.answers, verified.proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)
@@ -85,10 +85,10 @@ class JudgedLeg(Leg):
         return leg
 
 
-def judged(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
+def verified(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
     """A leg whose verdicts take surroundings and pulleys into account."""
     is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (surroundings or pulleys)
-    return JudgedLeg(leg) if is_needed else leg
+    return VerifiedLeg(leg) if is_needed else leg
 
 
 def _from_points(problem: Problem) -> Problem:
