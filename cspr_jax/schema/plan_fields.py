@@ -113,8 +113,8 @@ SEGMENT = {
     ),
     "failing": (
         "s",
-        "Splines: intervals of time in which the segment fails, since its start; of other families those in which it "
-        "meets a body, over pulleys in which it fails; null elsewhere.",
+        "Intervals of time in which the segment fails, since its start, of segments that are not feasible, splines, "
+        "paths, ellipses and free motions, among bodies and over pulleys; null elsewhere.",
     ),
     "failing_by_criterion": ("s", "Likewise, by the criterion that fails, the name of its flag; null elsewhere."),
     "frequency": ("rad s-1", "Ellipses: frequency of the ellipse on which the segment ends; to rest, starts."),
