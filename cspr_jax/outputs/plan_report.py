@@ -10,6 +10,7 @@ from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.plan_fields import SEGMENT
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -47,42 +48,8 @@ def verdict_text(verdict: int, feasible: bool) -> str:
     return "feasible" if feasible else Verdict(int(verdict)).text
 
 
-# Fields that only some families or robots have.
-_OF_SOME = (
-    "oscillations",
-    "envelope_oscillations",
-    "least_oscillations",
-    "inclination",
-    "det_margin",
-    "cable_interference",
-    "cable_distance_min",
-    "platform_interference",
-    "refuted_at",
-    "beta_hat",
-    "acceleration_time",
-    "active",
-    "least_duration",
-    "control_points",
-    "taut_durations",
-    "failing",
-    "failing_by_criterion",
-    "frequency",
-    "frequency_intervals",
-    "pseudotension_margin",
-    "rotation_frequencies",
-    "rotation_modes",
-    "lower_bound",
-    "gap",
-    "binding",
-    "sections",
-    "objective",
-    "energy",
-    "source",
-    "planned_duration",
-    "gain",
-    "retimed",
-    "path_deviation",
-)
+# Fields of segments that are never null for want of them: every family has the one, and the other is absent then.
+_OF_DETAILS = ("margin_unit", "tried_oscillations")
 
 
 def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
@@ -113,7 +80,8 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         **{row.name: float(getattr(peaks, row.peak)[i]) for row in LIMITS if row.peak},
         "samples": int(peaks.samples[i]),
     }
-    return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
+    of_some = dict.fromkeys(name for name in SEGMENT if name not in (*fields, *_OF_DETAILS))
+    return fields | of_some | plan.details(i)
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
