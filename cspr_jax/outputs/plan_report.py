@@ -48,7 +48,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
     return "feasible" if feasible else Verdict(int(verdict)).text
 
 
-# Fields of segments that are never null for want of them: every family has the one, and the other is absent then.
+# Fields of segments that are never null: every family has the first, and the second is absent where a family has none.
 _OF_DETAILS = ("margin_unit", "tried_oscillations")
 
 
