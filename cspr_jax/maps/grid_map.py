@@ -102,7 +102,7 @@ class GridMap(abc.ABC):
         level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros_like(radius)], axis=1)
         return np.c_[self._frame.rotated(level)[:, :2], self._frame.depth(cells["z"])]
 
-    def _start_places(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+    def _start_positions(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates, of axes and of `trajectory.from`.
         start, count = self._keys.trajectory.start, len(next(iter(cells.values())))
         fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
@@ -192,7 +192,7 @@ class PointMassMap(GridMap):
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates.
         start = self._keys.trajectory.start
-        return rest_point(np.asarray(cells["z0"])) if start is not None and start.rest else self._start_places(cells)
+        return rest_point(np.asarray(cells["z0"])) if start is not None and start.rest else self._start_positions(cells)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

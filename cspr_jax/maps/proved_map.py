@@ -81,7 +81,7 @@ def proved_columns(answers: Answers) -> dict[str, np.ndarray]:
     """Columns of a map of proved motions."""
     columns = {name: getattr(answers, name) for name in ("verdict", "tolerated", "not_tolerated")}
     columns |= {name: getattr(answers, source) for name, source in _COLUMNS.items()}
-    clear = np.array([proof.least(proof.proof.high, CONTACTS) for proof in answers.proof])
+    clear = np.array([proof.smallest(proof.proof.high, CONTACTS) for proof in answers.proof])
     return columns | {"clearance": np.where(answers.verdict & ~np.uint32(_BESIDE.value), np.nan, clear)}
 
 

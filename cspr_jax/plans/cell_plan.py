@@ -21,7 +21,7 @@ ORIENTATION = ("tilt_azimuth", "tilt", "torsion")
 
 
 def cell_plan(
-    settings: Mapping[str, Any], place: Mapping[str, float], values: Mapping[str, Any], *, samples: int = 120
+    settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], *, samples: int = 120
 ) -> dict[str, Any] | None:
     """Plan of the motion of one cell, as a plan file has it."""
     kind = MAP_KINDS[settings["map"]]
@@ -33,86 +33,86 @@ def cell_plan(
     if settings.get("limits"):
         trajectory_keys["limits"] = settings["limits"]
     if trajectory.get("family") == "path":
-        return _path(settings, place, {"samples": samples, **trajectory_keys})
+        return _path(settings, cell, {"samples": samples, **trajectory_keys})
     if "ellipse" in kind.takes:
-        return _turn(settings, place, values, {"samples": samples, **trajectory_keys})
-    depth = {name: place[name] for name in ("z0", "inclination") if name in place}
+        return _turn(settings, cell, values, {"samples": samples, **trajectory_keys})
+    depth = {name: cell[name] for name in ("z0", "inclination") if name in cell}
     if trajectory.get("family") == "free":
-        return _free(settings, place, {"samples": samples, **trajectory_keys, **depth})
+        return _free(settings, cell, {"samples": samples, **trajectory_keys, **depth})
     used = float(values.get("used_inclination", np.nan))
     if trajectory_keys.get("inclination") == "best" and np.isfinite(used):
         depth["inclination"] = used
     if kind.is_over_orientations and not depth:
         robot = settings["robot"]
         frame = frame_of(np.asarray(robot["base_points"], float), robot.get("z_axis", "down"))
-        depth["z0"] = float(frame.depth(place["z"]))  # horizontal transitions
-    target: dict[str, Any] = {"position": _target(settings, place)}
-    if any(axis in place for axis in ORIENTATION):
-        target["tilt_torsion"] = [float(place.get(axis, 0.0)) for axis in ORIENTATION]
+        depth["z0"] = float(frame.depth(cell["z"]))  # horizontal transitions
+    target: dict[str, Any] = {"position": _target(settings, cell)}
+    if any(axis in cell for axis in ORIENTATION):
+        target["tilt_torsion"] = [float(cell.get(axis, 0.0)) for axis in ORIENTATION]
     if np.isfinite(values.get("beta_hat", np.nan)):
         target["beta_hat"] = float(values["beta_hat"])
     count = next((int(values[name]) * arcs for name, arcs in COUNTS.items() if int(values.get(name, 0)) > 0), 0)
     if count:
         target["arcs"] = count
     plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **trajectory_keys, **depth}
-    plan["pose"] = [_start(settings, place), target]
+    plan["pose"] = [_start(settings, cell), target]
     return plan | {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
 
 
 def _turn(
-    settings: Mapping[str, Any], place: Mapping[str, float], values: Mapping[str, Any], keys: Mapping[str, Any]
+    settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], keys: Mapping[str, Any]
 ) -> dict[str, Any] | None:
     # One turn on the ellipse of a cell.
     table = SweepEllipse.model_validate(settings.get("ellipse") or {})
     robot = settings["robot"]
-    axes = cell_axes(table, place, is_planar=bool(robot.get("planar")) or robot.get("pattern") == "2T")
+    axes = cell_axes(table, cell, is_planar=bool(robot.get("planar")) or robot.get("pattern") == "2T")
     rule = table.model_dump(mode="json", exclude_none=True)["frequency"]
-    frequency = values.get("used_frequency", place.get("frequency", rule))
+    frequency = values.get("used_frequency", cell.get("frequency", rule))
     if not isinstance(frequency, str | dict):
         frequency = float(frequency)
         if not (np.isfinite(frequency) and frequency > 0.0):
             return None
     if not np.any(axes):
         return None
-    ellipse = {"centre": _target(settings, place), "half_axes": [axis.tolist() for axis in axes]}
+    ellipse = {"centre": _target(settings, cell), "half_axes": [axis.tolist() for axis in axes]}
     return {"schema": 1, "robot": robot, **keys, "ellipse": {**ellipse, "frequency": frequency}, "turns": 1.0}
 
 
-def _path(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+def _path(settings: Mapping[str, Any], cell: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
     # The path to the target of a cell.
-    start, end = _start(settings, place), _target(settings, place)
+    start, end = _start(settings, cell), _target(settings, cell)
     robot, table = settings["robot"], TargetPath.model_validate(settings["trajectory"].get("path") or {})
     path = table.between(start["position"], end, robot.get("z_axis", "down"))
     if path is None:
         return None
     target = {**start, "position": end, "path": path.model_dump(mode="json", exclude_none=True)}
-    surroundings = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
-    return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **surroundings}
+    obstacles = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
+    return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **obstacles}
 
 
-def _free(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+def _free(settings: Mapping[str, Any], cell: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
     # The free motion to the target of a cell, which keeps the orientation.
-    start, end = _start(settings, place), _target(settings, place)
+    start, end = _start(settings, cell), _target(settings, cell)
     if "position" in start and math.dist(start["position"], end) <= SAME_PLACE:
         return None
     target = {name: value for name, value in start.items() if name != "rest"} | {"position": end}
-    surroundings = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
-    return {"schema": 1, "robot": settings["robot"], **keys, "pose": [start, target], **surroundings}
+    obstacles = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
+    return {"schema": 1, "robot": settings["robot"], **keys, "pose": [start, target], **obstacles}
 
 
-def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:
+def _start(settings: Mapping[str, Any], cell: Mapping[str, float]) -> dict[str, Any]:
     start = dict(settings.get("trajectory", {}).get("from") or {})
-    if any(f"from_{name}" in place for name in "xyz"):
+    if any(f"from_{name}" in cell for name in "xyz"):
         fixed = start.get("position", [0.0, 0.0, 0.0])
-        start["position"] = [float(place.get(f"from_{name}", fixed[i])) for i, name in enumerate("xyz")]
+        start["position"] = [float(cell.get(f"from_{name}", fixed[i])) for i, name in enumerate("xyz")]
     return start or {"rest": True}
 
 
-def _target(settings: Mapping[str, Any], place: Mapping[str, float]) -> list[float]:
-    if "radius" not in place:
-        return [float(place[name]) for name in "xyz"]
+def _target(settings: Mapping[str, Any], cell: Mapping[str, float]) -> list[float]:
+    if "radius" not in cell:
+        return [float(cell[name]) for name in "xyz"]
     # The azimuth turns about the vertical through the centroid of the spools.
     centre = np.mean(np.asarray(settings["robot"]["base_points"], float), axis=0)
-    radius, azimuth = place["radius"], place["azimuth"]
+    radius, azimuth = cell["radius"], cell["azimuth"]
     x, y = centre[:2] + radius * np.array([np.cos(azimuth), np.sin(azimuth)])
-    return [float(x), float(y), float(place["z"])]
+    return [float(x), float(y), float(cell["z"])]

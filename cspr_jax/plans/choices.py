@@ -87,9 +87,10 @@ def _check_rest(robot: Robot, waypoints: Waypoints, z0: float) -> None:
         if not pose.rest or pose.position is None or _rests_anywhere(waypoints, i):
             continue
         if np.linalg.norm(waypoints.frame.inward(pose.position) - at_rest) > near:
-            place = [float(f"{value:.12g}") for value in waypoints.frame.outward(at_rest)]
+            position = [float(f"{value:.12g}") for value in waypoints.frame.outward(at_rest)]
             raise ConfigError(
-                waypoints.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
+                waypoints.path,
+                f"pose[{i}].position = {shown(pose.position)}: must be P0 = {position} at rest, or absent",
             )
 
 

@@ -27,20 +27,22 @@ def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> Plan
     _refuse_others(keys, path)
     frame = frame_of(robot_file.base_points, robot_file.z_axis)
     placed = [i for i, pose in enumerate(keys.pose) if pose.position is not None]
-    places = np.zeros((len(keys.pose), 3))
+    positions = np.zeros((len(keys.pose), 3))
     for i in placed:
-        places[i] = frame.inward(keys.pose[i].position)
+        positions[i] = frame.inward(keys.pose[i].position)
     arm, units = frame.rotated(centre), None
-    shifts = np.broadcast_to(arm, places.shape)  # of a platform that only translates
+    shifts = np.broadcast_to(arm, positions.shape)  # of a platform that only translates
     if robot_file.is_platform and placed:
-        units = pose_quaternions(Waypoints(robot_file, keys, path, frame, keys.family, 0, len(places) - 1), places)
+        units = pose_quaternions(
+            Waypoints(robot_file, keys, path, frame, keys.family, 0, len(positions) - 1), positions
+        )
         arm = _rotations(reference_of(build_robot(robot_file, keys, path))).apply(arm)
         shifts = _rotations(units).apply(arm)
     poses = list(keys.pose)
     for i in placed:
-        changes = {"position": np.asarray(frame.outward(places[i] + shifts[i])).tolist()}
+        changes = {"position": np.asarray(frame.outward(positions[i] + shifts[i])).tolist()}
         if poses[i].tilt_torsion is not None and units is not None:
-            # The direction from which the azimuth counts is that of the given place.
+            # The direction from which the azimuth counts is that of the given position.
             changes |= {"tilt_torsion": None, "quaternion": frame.rotated_quaternions(units[i]).tolist()}
         poses[i] = poses[i].model_copy(update=changes)
     return keys.model_copy(update={"pose": poses})

@@ -119,7 +119,7 @@ class PlannedMotions:
     @property
     def outcome_columns(self) -> dict[str, np.ndarray]:
         """Datasets that the outcomes of the legs add to a motion file."""
-        return {name: values for outcome in self.outcomes for name, values in outcome.columns().items()}
+        return {name: values for result in self.outcomes for name, values in result.columns().items()}
 
     @property
     def feasible(self) -> bool:
@@ -173,7 +173,7 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
         points=_points(sequence, legs, z0),
         legs=legs,
         demands=extremes,
-        outcomes=_outcomes(problem, sequence, legs, extremes),
+        outcomes=_results(problem, sequence, legs, extremes),
         causes=why,
         warnings=tuple(dict.fromkeys(lines)),
         point=_point(keys, sequence),
@@ -216,7 +216,7 @@ def _extremes(
     problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
 ) -> Peaks:
     # Heights are in the axes of the robot file.
-    extremes = _demands(problem, legs, keys, _shape(problem, robot_file, frame, keys))
+    extremes = _peaks(problem, legs, keys, _shape(problem, robot_file, frame, keys))
     return dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
 
 
@@ -243,15 +243,15 @@ def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.nd
     return points
 
 
-def _outcomes(
+def _results(
     problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...], extremes: Peaks
 ) -> tuple[LegResult, ...]:
-    outcomes, first, start = [], 0, 0.0
+    results, first, start = [], 0, 0.0
     for leg, joined_leg in zip(sequence.legs, legs, strict=True):
         tension_min = extremes.tension_min[first : first + len(leg)]
-        outcomes.append(leg.result(problem, joined_leg, tension_min, start))
+        results.append(leg.result(problem, joined_leg, tension_min, start))
         first, start = first + len(leg), start + float(joined_leg.answers.duration.sum())
-    return tuple(outcome for outcome in outcomes if outcome is not None)
+    return tuple(result for result in results if result is not None)
 
 
 def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
@@ -283,7 +283,7 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[st
     ]
 
 
-def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Peaks:
+def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Peaks:
     motions = [motion for leg in legs for motion in leg.motions]
     counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
     # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
@@ -299,8 +299,8 @@ def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
 
 def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:
     # Positions, velocities and accelerations must meet where another family goes on.
-    size, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
-    scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}
+    length, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
+    scales = {"position": length, "velocity": np.sqrt(length * gravity), "acceleration": gravity}
     for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):
         ends = (before.motions[-1], 1.0), (after.motions[0], 0.0)
         last, first = (states_at(motion, np.array([tau]))[:3] for motion, tau in ends)

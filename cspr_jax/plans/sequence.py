@@ -94,9 +94,9 @@ def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
         key = "family" if pose_family is None else f"pose[{i + 1}].family"
         names = " or ".join(f'"{name}"' for name in moving(robot_file.own_pattern))
         if not names:
-            known = "it moves robots of the patterns " + ", ".join(FAMILIES[family].legs)
+            moved = "it moves robots of the patterns " + ", ".join(FAMILIES[family].legs)
             raise ConfigError(
-                path, f'{key} = "{family}": no family moves {robot_file.kind} ("{robot_file.name}") yet: {known}'
+                path, f'{key} = "{family}": no family moves {robot_file.kind} ("{robot_file.name}") yet: {moved}'
             )
         why = no_equivalent(robot_file) if POINT_MASS in FAMILIES[family].legs else ""
         raise ConfigError(path, f'{key} = "{family}": must be {names} for {robot_file.kind} ("{robot_file.name}"){why}')

@@ -176,7 +176,7 @@ _ROWS = (
 
 
 def _add(row: Family) -> None:
-    if not isinstance(row, Family) or row.name in [known.name for known in _ROWS]:
+    if not isinstance(row, Family) or row.name in [other.name for other in _ROWS]:
         raise TypeError("must be a Family with a name of its own")
     FAMILIES[row.name] = row
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SHORT = 1e-6
 # By how much of what is missed the bounds of a piece may be apart. Of slacks in their units: by how much at least, and
 # times that a piece is halved.
-LOOSE, LEAST, HALVINGS = 0.5, 1e-7, 5
+LOOSE, SMALLEST, HALVINGS = 0.5, 1e-7, 5
 Sides = tuple[np.ndarray, np.ndarray]
 
 
@@ -57,7 +57,7 @@ def piece_slacks(
         return _first_less(slacks.low, low), _first_less(slacks.high, high)
 
     rows = criteria(problem.robot, problem.limits, scene)
-    return PieceSlacks(rows, *close_bounds(bounded, (knots[:-1], knots[1:]), LEAST, HALVINGS))
+    return PieceSlacks(rows, *close_bounds(bounded, (knots[:-1], knots[1:]), SMALLEST, HALVINGS))
 
 
 def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> Float[np.ndarray, "k n"]:
@@ -66,9 +66,9 @@ def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1
     return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, fraction), batch_size=BATCH)
 
 
-def short_blocks(instants: Float[np.ndarray, "k"], sizes: Float[np.ndarray, "k"]) -> Sides:
+def short_blocks(times: Float[np.ndarray, "k"], lengths: Float[np.ndarray, "k"]) -> Sides:
     """Blocks that are so short that what is bounded over them is known."""
-    return instants - SHORT * sizes, instants + SHORT * sizes
+    return times - SHORT * lengths, times + SHORT * lengths
 
 
 def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def close_bounds(
-    bounded: Callable[[np.ndarray, np.ndarray, np.ndarray], Sides], ends: Sides, least: float, halvings: int
+    bounded: Callable[[np.ndarray, np.ndarray, np.ndarray], Sides], ends: Sides, smallest: float, halvings: int
 ) -> Sides:
     """Bounds of the smallest slacks over pieces, which are halved where a negative lower bound is not close."""
     start, end = ends
@@ -89,7 +89,7 @@ def close_bounds(
         np.minimum.at(high, piece, above)
         # A block says how much is missed where the lower bound is about as close as the upper one.
         # Halving does not help if nothing is known even of the middle.
-        is_open = (below < 0.0) & (below < above - LOOSE * np.maximum(-above, least))
+        is_open = (below < 0.0) & (below < above - LOOSE * np.maximum(-above, smallest))
         is_loose = np.any(is_open, axis=1) & (level < halvings)
         np.minimum.at(low, piece[~is_loose], below[~is_loose])
         if not is_loose.any():

@@ -79,14 +79,14 @@ class MotionProof(NamedTuple):
     @property
     def margin(self) -> float:
         """Upper bound of the smallest margin of tensions, N."""
-        return self.least(self.proof.high, TENSIONS)
+        return self.smallest(self.proof.high, TENSIONS)
 
     @property
     def margin_bound(self) -> float:
         """Lower bound of the smallest margin of tensions, N."""
-        return self.least(self.proof.low, TENSIONS)
+        return self.smallest(self.proof.low, TENSIONS)
 
-    def least(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
+    def smallest(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
         """Smallest of the bounds of some criteria."""
         chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
         return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
@@ -261,7 +261,7 @@ def margins_of(proofs: Sequence[MotionProof]) -> dict[str, np.ndarray]:
     return {
         "margin": np.array([case.margin for case in proofs]),
         "margin_bound": np.array([case.margin_bound for case in proofs]),
-        "limit_margin": np.array([case.least(case.proof.high, TENSIONS, others=True) for case in proofs]),
+        "limit_margin": np.array([case.smallest(case.proof.high, TENSIONS, others=True) for case in proofs]),
     }
 
 

@@ -124,8 +124,8 @@ class Verifier(NamedTuple):
     def _proofs(self, motions: Any, rows: np.ndarray, intervals: bool) -> list[MotionProof]:
         how: Any = {"scene": self.scene, "contacts_alone": not self.has_pulleys}
         if not isinstance(motions, list):
-            several = motions.take(rows)
-            return proofs_of(self.problem, several.bounds, several.durations, intervals=intervals, **how)
+            batch = motions.take(rows)
+            return proofs_of(self.problem, batch.bounds, batch.durations, intervals=intervals, **how)
         chosen = [motions[i] for i in rows]
         return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
 

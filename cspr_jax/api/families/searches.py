@@ -33,7 +33,6 @@ from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, rest_point
-from cspr_jax.verification.attained import with_attained
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +62,8 @@ class WithMotions:
         Returns:
             the causes for each of the n motions, the worst one first; a feasible motion has none.
         """
+        from cspr_jax.verification.attained import with_attained  # searches themselves need no proof of any motion
+
         with double_precision():
             placed, count = self.make(self), len(self.verdict)
             if not count:

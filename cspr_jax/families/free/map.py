@@ -40,7 +40,7 @@ class FreeMap(ProvedMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         ends, z0 = self._targets(cells), cells.get("z0")
-        starts = rest_point(np.asarray(z0)) if self._rests else self._start_places(cells)
+        starts = rest_point(np.asarray(z0)) if self._rests else self._start_positions(cells)
         at_ends, at_starts = self._at_rest(ends), self._at_rest(starts)
         stays = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE
         out = np.array(

@@ -27,7 +27,7 @@ class PathsMap(ProvedMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         starts, ends = (
-            self._frame.outward(positions) for positions in (self._start_places(cells), self._targets(cells))
+            self._frame.outward(positions) for positions in (self._start_positions(cells), self._targets(cells))
         )
         tables = [self._path.between(*pair, self._z_axis) for pair in zip(starts.tolist(), ends.tolist(), strict=True)]
         moves = np.array([table is not None for table in tables])

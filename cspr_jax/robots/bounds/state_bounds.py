@@ -60,8 +60,8 @@ def at_rest(state: StateBounds) -> StateBounds:
     """Bounds of the same poses without a motion."""
     poses = ("position", "rotation")
     changed = {name: bounds for name, bounds in state._asdict().items() if bounds is not None}
-    still = {name: jax.tree.map(np.zeros_like, bounds) for name, bounds in changed.items() if name not in poses}
-    return state._replace(**still)
+    zeros = {name: jax.tree.map(np.zeros_like, bounds) for name, bounds in changed.items() if name not in poses}
+    return state._replace(**zeros)
 
 
 class CableBounds(NamedTuple):

@@ -183,7 +183,7 @@ class RedundantChecker(MotionChecker):
             proof = proof_of(self.problem, motion)
             checks.verdict[i], checks.bound[i] = proof.verdict, proof.margin_bound / self._weight
             checks.slack[i, 0] = np.fmin(checks.slack[i, 0], proof.margin / self._weight)
-            clearance = proof.least(proof.proof.high, Verdict.CABLE_CABLE)
+            clearance = proof.smallest(proof.proof.high, Verdict.CABLE_CABLE)
             checks.gap[i] = np.fmin(checks.gap[i], clearance + self._diameter)
             firsts = [float(intervals[0].mean()) for intervals in proof.proof.failing if len(intervals)]
             checks.refuted_tau[i] = min(firsts, default=np.nan) / float(motion.duration())
