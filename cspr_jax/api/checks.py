@@ -250,18 +250,18 @@ def check(  # noqa: PLR0913
     if trajectory is not None and not isinstance(times, str | Path):
         raise InputError("trajectory", trajectory, "absent but for a file of CASPR")
     settings = {"interpolation": interpolation, "ends": ends, "smooth": smooth, "point": point}
-    keys = check_keys(robot, limits, trajectory=trajectory, **settings)
+    spec = check_keys(robot, limits, trajectory=trajectory, **settings)
     with double_precision():
         if isinstance(times, str | Path):
-            return check_file(Path(times), keys)
-        plan = checked_plan(keys, NAME)
+            return check_file(Path(times), spec)
+        plan = checked_plan(spec, NAME)
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
         elif hasattr(times, "state") or _is_curve(times):
             source = times
         else:
             source = _function(times, duration, plan)
-        return _check_of(plan.with_source(str(NAME), source), json_text(keys))
+        return _check_of(plan.with_source(str(NAME), source), json_text(spec))
 
 
 def _is_curve(times: Any) -> bool:
@@ -282,11 +282,11 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
 
 
 def check_file(
-    motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] = (), limits: Path | None = None
+    motion: Path, spec: Mapping[str, Any], *, outputs: Sequence[str] = (), limits: Path | None = None
 ) -> Check:
     """Check the motion of a file."""
     with double_precision():
-        data = {"schema": 1, "family": "spline", **keys, "motion": str(motion)}
+        data = {"schema": 1, "family": "spline", **spec, "motion": str(motion)}
         plan = checked_plan(data, motion)
         try:
             return _check_of(plan, json_text(data))
@@ -309,8 +309,8 @@ def _of_file(error: ConfigError, motion: Path, limits: Path | None) -> ConfigErr
     return ConfigError(limits if limits is not None and is_limit else motion, first, others=others)
 
 
-def _check_of(keys: PlanFile, text: str) -> Check:
-    return _shown(planning.plan_of(keys, NAME), text)
+def _check_of(spec: PlanFile, text: str) -> Check:
+    return _shown(planning.plan_of(spec, NAME), text)
 
 
 def _shown(planned: planning.PlannedMotions, text: str) -> Check:
@@ -319,12 +319,12 @@ def _shown(planned: planning.PlannedMotions, text: str) -> Check:
     return Check(Plan(**fields | {"text": text}))
 
 
-def _function(function: Any, duration: float | None, keys: PlanFile) -> Placed[FunctionMotion]:
+def _function(function: Any, duration: float | None, spec: PlanFile) -> Placed[FunctionMotion]:
     if not callable(function):
         raise InputError("positions", None, "must be given beside times: (n, 3) m", problem="missing")
     if duration is None:
         raise InputError("duration", None, "must be given beside a function: s", problem="missing")
-    file = resolve_robot(keys.robot, NAME, Path())
-    frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, keys, NAME))
+    file = resolve_robot(spec.robot, NAME, Path())
+    frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, spec, NAME))
     motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)
     return Placed(motion, frame)

@@ -89,23 +89,23 @@ def check_many(
     Raises:
         InputError: samples that make no motion, or an impossible argument.
     """
-    keys = checked_plan(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
+    spec = checked_plan(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
     samples_of_all = (positions, quaternions, velocities, accelerations)
     columns = [None if column is None else np.asarray(column) for column in samples_of_all]
     others = {"times": times, "quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     count, rows = np.shape(positions)[:2]
     _check_shapes(count, rows, {name: np.shape(array) for name, array in others.items() if array is not None})
-    instants = np.broadcast_to(np.asarray(times, float), (count, rows))
+    sample_times = np.broadcast_to(np.asarray(times, float), (count, rows))
     with double_precision():
-        file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["spline"].legs])
-        problem = build_problem(file, keys, keys, NAME, any_cables=True)
+        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["spline"].legs])
+        problem = build_problem(file, spec, spec, NAME, any_cables=True)
         axes = frame_of(file.base_points, file.z_axis)
-        reference = reference_of(build_robot(file, keys, NAME))
+        reference = reference_of(build_robot(file, spec, NAME))
         settings: dict[str, Any] = {"z_axis": file.z_axis, "is_platform": file.is_platform}
         settings |= {"interpolation": interpolation, "ends": ends}
         motions = []
         for i in range(count):
-            samples = samples_of(instants[i], *(None if column is None else column[i] for column in columns))
+            samples = samples_of(sample_times[i], *(None if column is None else column[i] for column in columns))
             try:
                 curve = kept_to(file.own_pattern, source_spline(samples, **settings), is_planar=False)
                 motions.append(placed_inward(curve, axes, reference))
@@ -113,9 +113,9 @@ def check_many(
                 raise InputError(
                     f"motion {i}, {error.key}", error.value, error.allowed, problem=error.problem
                 ) from error
-        several, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
-        proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
-        answers = with_attained(problem, answers_of(proofs, several.durations), motions, scene)
+        batch, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
+        proofs = proofs_of(problem, batch.bounds, batch.durations, scene, batch.jumps)
+        answers = with_attained(problem, answers_of(proofs, batch.durations), motions, scene)
         judge_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}

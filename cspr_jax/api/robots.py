@@ -88,8 +88,8 @@ def parallel_pair_robot(
     Raises:
         InputError: a radius that is not positive, or a robot file with these numbers would be refused.
     """
-    places, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
-    middles = spool_radius * np.stack([np.cos(places), np.sin(places), 0.0 * places], axis=1)
+    positions, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
+    middles = spool_radius * np.stack([np.cos(positions), np.sin(positions), 0.0 * positions], axis=1)
     high = np.sqrt(3.0) * half
     firsts = np.array([[-half, -high, 0.0], [platform_radius, 0.0, 0.0], [-half, high, 0.0]])
     points = np.stack([firsts, -firsts], axis=1)

@@ -75,8 +75,8 @@ def open_result(path: str | Path) -> Result:
         StoreError: the file is missing, not HDF5, damaged, or not written by this program; or the run in the directory
             has not finished.
     """
-    place = Path(path)
-    result = _open_result(inspection.result_in(place) if place.is_dir() else place)
+    cell = Path(path)
+    result = _open_result(inspection.result_in(cell) if cell.is_dir() else cell)
     return DisplayedResult(**vars(result))
 
 
@@ -216,8 +216,8 @@ def run(
         hooks.on_tile = on_tile
     tile_range = None if tiles is None else (int(tiles[0]), int(tiles[1]))
     options = engine.Options(accept_environment_change, prune, tuple(sys.argv), tile_range)
-    place = run_directory(sweep) if directory is None else Path(directory)
-    job = Job(sweep, place, options, hooks, workers, scheduler)
+    cell = run_directory(sweep) if directory is None else Path(directory)
+    job = Job(sweep, cell, options, hooks, workers, scheduler)
     return job.finished() or job.go()
 
 
@@ -252,10 +252,10 @@ def merged(
     """As `merge`, with the options and hooks of a run."""
     from cspr_jax.sweep.merging import Merged, read_part
 
-    places = [Path(path) for path in paths]
-    if any(path.resolve() in (directory.resolve(), *directory.resolve().parents) for path in places if path.exists()):
+    parts = [Path(path) for path in paths]
+    if any(path.resolve() in (directory.resolve(), *directory.resolve().parents) for path in parts if path.exists()):
         raise ConfigError("-o", f"{directory}: must be another directory than those that are joined")
-    tiles = Merged([read_part(path) for path in places], accept_environment_change=options.accept_environment_change)
+    tiles = Merged([read_part(path) for path in parts], accept_environment_change=options.accept_environment_change)
     run = engine.Run(tiles.sweep, directory, options, hooks or engine.Hooks())
     return run.finished() or run.go(tiles).result
 

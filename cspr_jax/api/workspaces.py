@@ -130,14 +130,16 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 
-def _poses(robot, frame: Frame, places: np.ndarray, orientations, point: str) -> tuple[np.ndarray, np.ndarray | None]:
+def _poses(
+    robot, frame: Frame, positions: np.ndarray, orientations, point: str
+) -> tuple[np.ndarray, np.ndarray | None]:
     # Positions of the mass centre, and quaternions, (n, 3) and (n, 4).
     row = PATTERNS[robot.pattern]
-    inner, turns = np.asarray(frame.inward(places)), None
+    inner, turns = np.asarray(frame.inward(positions)), None
     if orientations is not None:
         if not row.is_body:
             raise InputError("orientations", None, "must be None", problem="a point mass has none")
-        unit_quaternions = quaternions("orientations", orientations, len(places))
+        unit_quaternions = quaternions("orientations", orientations, len(positions))
         if row.is_planar and unit_quaternions[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.rotated_quaternions(unit_quaternions)

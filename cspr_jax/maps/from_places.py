@@ -6,9 +6,9 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
 
 
-def check_place(robot_file: RobotFile, keys: SweepFile, file: object, *, rests: bool = False) -> None:
+def check_place(robot_file: RobotFile, spec: SweepFile, file: object, *, rests: bool = False) -> None:
     """Refuse a start that is no place of a robot."""
-    start = keys.trajectory.start
+    start = spec.trajectory.start
     if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
         raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
     if start is not None and start.rest and not rests:
@@ -18,7 +18,7 @@ def check_place(robot_file: RobotFile, keys: SweepFile, file: object, *, rests: 
 class FromPlacesMap(PointMassMap):
     """The map of motions of a point mass from given places; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse starts that are no places."""
-        super().__init__(robot_file, keys, file)
-        check_place(robot_file, keys, file)
+        super().__init__(robot_file, spec, file)
+        check_place(robot_file, spec, file)

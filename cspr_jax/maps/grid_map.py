@@ -47,14 +47,14 @@ class GridMap(abc.ABC):
     any_cables: ClassVar[bool] = False
     proves: ClassVar[bool] = False
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
-        self._keys, self._file = keys, file
+        self._keys, self._file = spec, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         self._problem = build_problem(
             robot_file,
-            keys.trajectory,
-            keys.limits,
+            spec.trajectory,
+            spec.limits,
             file,
             at="trajectory.",
             for_bounds=for_bounds,
@@ -67,8 +67,8 @@ class GridMap(abc.ABC):
             return None
         from cspr_jax.build.scenes import scene_of  # with the geometry of bodies, which other sweeps need not
 
-        keys, frame = self._keys, self._frame
-        return scene_of(self._problem.robot, robot_file, frame, keys, self._file, trajectory=keys.trajectory)
+        spec, frame = self._keys, self._frame
+        return scene_of(self._problem.robot, robot_file, frame, spec, self._file, trajectory=spec.trajectory)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -112,9 +112,11 @@ class GridMap(abc.ABC):
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Return cells among which depths and heights have their extremes. Among azimuths the one down the slope of the
         # spool plane stands for all: no other target is deeper below it.
-        slope = self._frame.rotated(plane_normal(self._problem.robot))
+        derivative = self._frame.rotated(plane_normal(self._problem.robot))
         axes = {
-            name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])
+            name: np.array([points.min(), points.max()])
+            if name != "azimuth"
+            else np.arctan2(derivative[1:2], derivative[:1])
             for name, points in grid.axes.items()
             if name in names
         }
@@ -140,8 +142,8 @@ class GridMap(abc.ABC):
         floor = touchable(self._problem).limits.floor
         if not (depth > 0.0).any():
             level = np.abs(depth) <= AT_P0 * float(spool_radius(self._problem.robot))
-            places = {True: "in the spool plane", False: "above the spool plane"}
-            where = places[True] + " or above it" if len(set(level.tolist())) == 2 else places[bool(level[0])]
+            words = {True: "in the spool plane", False: "above the spool plane"}
+            where = words[True] + " or above it" if len(set(level.tolist())) == 2 else words[bool(level[0])]
             question = "" if level.all() else f" ({axis_question(self._z_axis)})"
             raise ConfigError(self._file, f"{key}: every point is {where}: must be some below{question}")
         if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
@@ -151,11 +153,11 @@ class GridMap(abc.ABC):
 class PlatformMap(GridMap):
     """The map of a sweep of a platform; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse a point mass."""
         if not robot_file.is_platform:
             raise ConfigError(file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a platform in this map')
-        super().__init__(robot_file, keys, file)
+        super().__init__(robot_file, spec, file)
 
     @property
     def _is_redundant(self) -> bool:
@@ -180,14 +182,14 @@ class PlatformMap(GridMap):
 class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Refuse a platform."""
         if robot_file.is_platform:
             why = no_equivalent(robot_file)
             raise ConfigError(
                 file, f'robot "{robot_file.name}" is a rigid platform: must be a point mass in this map{why}'
             )
-        super().__init__(robot_file, keys, file, for_bounds=for_bounds)
+        super().__init__(robot_file, spec, file, for_bounds=for_bounds)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates.

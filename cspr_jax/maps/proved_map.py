@@ -37,26 +37,26 @@ class ProvedMap(GridMap):
     any_cables = True
     from_rest: ClassVar[bool] = False
 
-    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse robots that go along no path, and starts without a place."""
-        super().__init__(robot_file, keys, file)
-        check_place(robot_file, keys, file, rests=self.from_rest)
+        super().__init__(robot_file, spec, file)
+        check_place(robot_file, spec, file, rests=self.from_rest)
         if robot_file.own_pattern == "1T" or PATTERNS[robot_file.own_pattern].is_jointed:
             allowed = "must be one that moves in space or in a plane in this map"
             raise ConfigError(file, f'robot "{robot_file.name}" is {robot_file.kind}: {allowed}')
-        start, axes = keys.trajectory.start, [getattr(keys.axes, f"from_{name}") for name in "xyz"]
+        start, axes = spec.trajectory.start, [getattr(spec.axes, f"from_{name}") for name in "xyz"]
         if start is None and None in axes:
             allowed = "{ position = [x, y, z] }, or axes from_x, from_y, from_z"
             raise ConfigError(file, f"trajectory.from is missing: {allowed}")
         for key in ("tilt_torsion", "beta_hat", *(() if robot_file.is_platform else ("quaternion",))):
             if start is not None and getattr(start, key) is not None:
-                absent = f'must be absent with family = "{keys.trajectory.family}"'
+                absent = f'must be absent with family = "{spec.trajectory.family}"'
                 raise ConfigError(file, f"trajectory.from.{key}: {absent}")
         self._unit = None
         if isinstance(self._problem.robot, PlatformRobot):
             quaternion = None if start is None else start.quaternion
             self._unit = given_quaternion(quaternion, "trajectory.from.quaternion", file)
-        self._scene = scene_of(self._problem.robot, robot_file, self._frame, keys, file, trajectory=keys.trajectory)
+        self._scene = scene_of(self._problem.robot, robot_file, self._frame, spec, file, trajectory=spec.trajectory)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach; see `GridMap.refuse_hopeless`."""

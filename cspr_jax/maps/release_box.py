@@ -29,9 +29,9 @@ class ReleaseBox(NamedTuple):
 
 def box_of(robot: PointMassRobot, frame: Frame, releases: Sequence[Range] = (None, None, None)) -> ReleaseBox:
     """Bounds of places of release."""
-    size = float(spool_radius(robot))
-    aside = 0.0 if robot.dof == PLANAR else ASIDE * size
-    corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])
+    radius = float(spool_radius(robot))
+    aside = 0.0 if robot.dof == PLANAR else ASIDE * radius
+    corners = frame.outward([[-ASIDE * radius, -aside, 0.0], [ASIDE * radius, aside, DEEP * radius]])
     for i, ends in enumerate(releases):
         if ends is not None:
             corners[:, i] = ends

@@ -60,7 +60,7 @@ def cell_plan(
 
 
 def _turn(
-    settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], keys: Mapping[str, Any]
+    settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], plan_file: Mapping[str, Any]
 ) -> dict[str, Any] | None:
     # One turn on the ellipse of a cell.
     table = SweepEllipse.model_validate(settings.get("ellipse") or {})
@@ -75,10 +75,12 @@ def _turn(
     if not np.any(axes):
         return None
     ellipse = {"centre": _target(settings, cell), "half_axes": [axis.tolist() for axis in axes]}
-    return {"schema": 1, "robot": robot, **keys, "ellipse": {**ellipse, "frequency": frequency}, "turns": 1.0}
+    return {"schema": 1, "robot": robot, **plan_file, "ellipse": {**ellipse, "frequency": frequency}, "turns": 1.0}
 
 
-def _path(settings: Mapping[str, Any], cell: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+def _path(
+    settings: Mapping[str, Any], cell: Mapping[str, float], plan_file: Mapping[str, Any]
+) -> dict[str, Any] | None:
     # The path to the target of a cell.
     start, end = _start(settings, cell), _target(settings, cell)
     robot, table = settings["robot"], TargetPath.model_validate(settings["trajectory"].get("path") or {})
@@ -87,17 +89,19 @@ def _path(settings: Mapping[str, Any], cell: Mapping[str, float], keys: Mapping[
         return None
     target = {**start, "position": end, "path": path.model_dump(mode="json", exclude_none=True)}
     obstacles = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
-    return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **obstacles}
+    return {"schema": 1, "robot": robot, **plan_file, "pose": [start, target], **obstacles}
 
 
-def _free(settings: Mapping[str, Any], cell: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+def _free(
+    settings: Mapping[str, Any], cell: Mapping[str, float], plan_file: Mapping[str, Any]
+) -> dict[str, Any] | None:
     # The free motion to the target of a cell, which keeps the orientation.
     start, end = _start(settings, cell), _target(settings, cell)
     if "position" in start and math.dist(start["position"], end) <= SAME_PLACE:
         return None
     target = {name: value for name, value in start.items() if name != "rest"} | {"position": end}
     obstacles = {name: settings[name] for name in ObstacleKeys.model_fields if name in settings}
-    return {"schema": 1, "robot": settings["robot"], **keys, "pose": [start, target], **obstacles}
+    return {"schema": 1, "robot": settings["robot"], **plan_file, "pose": [start, target], **obstacles}
 
 
 def _start(settings: Mapping[str, Any], cell: Mapping[str, float]) -> dict[str, Any]:

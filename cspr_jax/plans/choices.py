@@ -31,53 +31,55 @@ DEPTHS = 200
 def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
     """The plan's z0, given or chosen."""
     waypoints = sequence.waypoints
-    keys, path, targets = waypoints.plan_file, waypoints.path, waypoints.targets
-    if keys.z0 is None and not _needs_depth(waypoints):
+    plan_file, path, targets = waypoints.plan_file, waypoints.path, waypoints.targets
+    if plan_file.z0 is None and not _needs_depth(waypoints):
         return float("nan")
     _check_depth_keys(waypoints)
-    if isinstance(keys.z0, float):
-        if keys.z0 > LARGEST_LENGTH:
-            raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
-        _check_rest(problem.robot, waypoints, keys.z0)
-        return keys.z0
-    for i, pose in enumerate(keys.pose):
+    if isinstance(plan_file.z0, float):
+        if plan_file.z0 > LARGEST_LENGTH:
+            raise ConfigError(path, f"z0 = {shown(plan_file.z0)}: must be at most 1e6 m")
+        _check_rest(problem.robot, waypoints, plan_file.z0)
+        return plan_file.z0
+    for i, pose in enumerate(plan_file.pose):
         if pose.rest and pose.position is not None:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must be absent where z0 is chosen")
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
-    if not isinstance(keys.z0, DepthRule):
+    if not isinstance(plan_file.z0, DepthRule):
         return _depth_of_inclination(problem, waypoints)
-    if keys.z0.choose == "mean":
+    if plan_file.z0.choose == "mean":
         z0 = depths.mean_depth(problem.robot, targets)
-    elif keys.z0.choose == "conservative":
+    elif plan_file.z0.choose == "conservative":
         z0 = depths.conservative_depth(problem.robot, targets) * (1.0 + ABOVE_BOUND)
     else:
         with within("fastest z0"):
             z0 = _fastest_depth(problem, sequence)
     if not 0.0 < z0 <= LARGEST_LENGTH:
-        hint = "".join(f" ({line})" for line in plan_hints(keys, waypoints.robot_file))
+        hint = "".join(f" ({line})" for line in plan_hints(plan_file, waypoints.robot_file))
         why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
-        raise ConfigError(path, f'z0.choose = "{keys.z0.choose}": must be a number here, {why}')
+        raise ConfigError(path, f'z0.choose = "{plan_file.z0.choose}": must be a number here, {why}')
     return z0
 
 
 def _needs_depth(waypoints: Waypoints) -> bool:
     # Rests elsewhere than in P0 need no depth of P0.
-    keys = waypoints.plan_file
-    anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
+    plan_file = waypoints.plan_file
+    anywhere = all(FAMILIES[name].rests_anywhere for name in plan_file.families)
     return (
-        not anywhere or keys.inclination is not None or any(pose.position is None and pose.rest for pose in keys.pose)
+        not anywhere
+        or plan_file.inclination is not None
+        or any(pose.position is None and pose.rest for pose in plan_file.pose)
     )
 
 
 def _check_depth_keys(waypoints: Waypoints) -> None:
-    keys, path = waypoints.plan_file, waypoints.path
-    if keys.z0 is None and keys.inclination is None:
-        other = ", or inclination" if set(keys.families) == {"transition"} else ""
+    plan_file, path = waypoints.plan_file, waypoints.path
+    if plan_file.z0 is None and plan_file.inclination is None:
+        other = ", or inclination" if set(plan_file.families) == {"transition"} else ""
         raise ConfigError(
             path, f'z0 is missing: depth of P0, m, or {{ choose = "mean" | "conservative" | "fastest" }}{other}'
         )
-    if keys.z0 is not None and keys.inclination is not None:
+    if plan_file.z0 is not None and plan_file.inclination is not None:
         raise ConfigError(path, "z0, inclination: must be one of them")
 
 

@@ -19,38 +19,38 @@ from cspr_jax.numerics.linear.frames import frame_of
 OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "acceleration")
 
 
-def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> PlanFile:
+def with_mass_centres(robot_file: RobotFile, plan_file: PlanFile, path: Path) -> PlanFile:
     """A plan whose poses have the positions of the mass centre."""
-    centre = centre_from(robot_file.as_written, keys.point)
+    centre = centre_from(robot_file.as_written, plan_file.point)
     if centre is None or not centre.any():
-        return keys
-    _refuse_others(keys, path)
+        return plan_file
+    _refuse_others(plan_file, path)
     frame = frame_of(robot_file.base_points, robot_file.z_axis)
-    placed = [i for i, pose in enumerate(keys.pose) if pose.position is not None]
-    positions = np.zeros((len(keys.pose), 3))
+    placed = [i for i, pose in enumerate(plan_file.pose) if pose.position is not None]
+    positions = np.zeros((len(plan_file.pose), 3))
     for i in placed:
-        positions[i] = frame.inward(keys.pose[i].position)
+        positions[i] = frame.inward(plan_file.pose[i].position)
     arm, units = frame.rotated(centre), None
     shifts = np.broadcast_to(arm, positions.shape)  # of a platform that only translates
     if robot_file.is_platform and placed:
         units = pose_quaternions(
-            Waypoints(robot_file, keys, path, frame, keys.family, 0, len(positions) - 1), positions
+            Waypoints(robot_file, plan_file, path, frame, plan_file.family, 0, len(positions) - 1), positions
         )
-        arm = _rotations(reference_of(build_robot(robot_file, keys, path))).apply(arm)
+        arm = _rotations(reference_of(build_robot(robot_file, plan_file, path))).apply(arm)
         shifts = _rotations(units).apply(arm)
-    poses = list(keys.pose)
+    poses = list(plan_file.pose)
     for i in placed:
         changes = {"position": np.asarray(frame.outward(positions[i] + shifts[i])).tolist()}
         if poses[i].tilt_torsion is not None and units is not None:
             # The direction from which the azimuth counts is that of the given position.
             changes |= {"tilt_torsion": None, "quaternion": frame.rotated_quaternions(units[i]).tolist()}
         poses[i] = poses[i].model_copy(update=changes)
-    return keys.model_copy(update={"pose": poses})
+    return plan_file.model_copy(update={"pose": poses})
 
 
-def _refuse_others(keys: PlanFile, path: Path) -> None:
-    tables: list[tuple[str, Pose | PlanFile]] = [("", keys)]
-    tables += [(f"pose[{i}].", pose) for i, pose in enumerate(keys.pose)]
+def _refuse_others(plan_file: PlanFile, path: Path) -> None:
+    tables: list[tuple[str, Pose | PlanFile]] = [("", plan_file)]
+    tables += [(f"pose[{i}].", pose) for i, pose in enumerate(plan_file.pose)]
     for prefix, table in tables:
         for key in OTHERS:
             if getattr(table, key, None) is not None:

@@ -44,18 +44,18 @@ class _Window(NamedTuple):
     ends: str
 
 
-def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
+def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
     """Plan of one motion of a long table, without the motion itself: nothing can be written of it."""
     for key in ("smooth", "stretch"):
-        if getattr(keys, key) is not None:
+        if getattr(plan_file, key) is not None:
             raise ConfigError(path, f"{key}: must be absent in a table of so many rows")
-    robot_file = as_moved(resolve_robot(keys.robot, path, Path()), [FAMILIES["spline"].legs])
-    problem = build_problem(robot_file, keys, keys, path, any_cables=True)
+    robot_file = as_moved(resolve_robot(plan_file.robot, path, Path()), [FAMILIES["spline"].legs])
+    problem = build_problem(robot_file, plan_file, plan_file, path, any_cables=True)
     if problem.limits.uncertainty is not None:
         raise ConfigError(path, "uncertainty: must be absent in a table of so many rows")
     frame, notes = frame_of(robot_file.base_points, robot_file.z_axis), dict[str, None]()
     try:
-        windows = list(_judged(problem, robot_file, frame, keys, path, notes))
+        windows = list(_judged(problem, robot_file, frame, plan_file, path, notes))
     except InputError as error:
         raise ConfigError(path, str(error)) from error
     duration = np.array([windows[-1].start + windows[-1].duration])
@@ -63,7 +63,7 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
     extremes = _reduced([window.demands for window in windows], [window.start for window in windows])
     return PlannedMotions(
         robot_file=robot_file,
-        keys=keys.model_copy(update={"interpolation": windows[0].interpolation, "ends": windows[0].ends or None}),
+        keys=plan_file.model_copy(update={"interpolation": windows[0].interpolation, "ends": windows[0].ends or None}),
         problem=problem,
         z0=float("nan"),
         frame=frame,
@@ -76,11 +76,11 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
 
 
 def _judged(
-    problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile, path: Path, notes: dict[str, None]
+    problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: PlanFile, path: Path, notes: dict[str, None]
 ) -> Iterator[_Window]:
-    scene = scene_of(problem.robot, robot_file, frame, keys, path, trajectory=keys)
+    scene = scene_of(problem.robot, robot_file, frame, plan_file, path, trajectory=plan_file)
     corners = shape_corners(problem.robot, scene)
-    axes, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
+    axes, limits = reference_of(build_robot(robot_file, plan_file, path)), problem.limits
     limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
     tables = motion_windows(path)
     says: dict[str, Any] = {}
@@ -92,13 +92,13 @@ def _judged(
             says.update(is_planar=getattr(window.table, "is_planar", False))
             yield window
 
-    settings = {"z_axis": robot_file.z_axis, "interpolation": keys.interpolation, "ends": keys.ends}
+    settings = {"z_axis": robot_file.z_axis, "interpolation": plan_file.interpolation, "ends": plan_file.ends}
     for start, curve in window_splines(noted(), **settings):
         reference = np.array(IDENTITY) if says["is_written"] else axes
-        centre = centre_from(robot_file, keys.point or says["point"])
+        centre = centre_from(robot_file, plan_file.point or says["point"])
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
-        extremes = peaks(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule, corners)
+        extremes = peaks(problem.robot, [motion], [SAMPLES + 1], limits, plan_file.tension_rule, corners)
         proof = attained(problem, motion, proof_of(problem, motion, scene), scene)
         yield _Window(start, float(motion.duration()), proof, extremes, curve.interpolation, curve.ends)
 

@@ -138,35 +138,37 @@ def plan(path: Path) -> PlannedMotions:
     return dataclasses.replace(plan_of(read_plan(text, path), path), text=text)
 
 
-def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
+def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file's content."""
-    legs_of = [FAMILIES[name].legs for name in keys.families]
-    robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
-    if keys.point == "origin":
+    legs_of = [FAMILIES[name].legs for name in plan_file.families]
+    robot_file = as_moved(resolve_robot(plan_file.robot, path, path.parent), legs_of)
+    if plan_file.point == "origin":
         from cspr_jax.plans.given_points import with_mass_centres  # it loads pieces of SciPy
 
-        keys = with_mass_centres(robot_file, keys, path)
-    sequence = PlanLegs(robot_file, keys, path)
-    any_cables = all(robot_file.own_pattern in FAMILIES[name].any_cables for name in keys.families)
-    problem = build_problem(robot_file, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables, pulleys=True)
-    _check_rule(problem, keys, path)
+        plan_file = with_mass_centres(robot_file, plan_file, path)
+    sequence = PlanLegs(robot_file, plan_file, path)
+    any_cables = all(robot_file.own_pattern in FAMILIES[name].any_cables for name in plan_file.families)
+    problem = build_problem(
+        robot_file, plan_file, plan_file, path, epsilon=FIRST_EPSILON, any_cables=any_cables, pulleys=True
+    )
+    _check_rule(problem, plan_file, path)
     for leg in sequence.legs:
         leg.check(problem)
     z0 = chosen_depth(problem, sequence)
-    if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
+    if isinstance(plan_file.amplitude, NamedAmplitude) and plan_file.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(problem, sequence, z0)
         problem = problem._replace(amplitude=amplitude)
     legs = tuple(JoinedLeg(leg.waypoints.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.waypoints.frame
     legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
-    why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, keys)
+    why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.waypoints, z0)
-    lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
+    lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
     return PlannedMotions(
         robot_file=robot_file,
-        keys=keys,
+        keys=plan_file,
         problem=problem,
         z0=z0,
         frame=frame,
@@ -176,14 +178,14 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
         outcomes=_results(problem, sequence, legs, extremes),
         causes=why,
         warnings=tuple(dict.fromkeys(lines)),
-        point=_point(keys, sequence),
+        point=_point(plan_file, sequence),
     )
 
 
-def _point(keys: PlanFile, sequence: PlanLegs) -> str:
+def _point(plan_file: PlanFile, sequence: PlanLegs) -> str:
     # The point that the plan names, else that of its files, if it is the same of all.
     points = {leg.point for leg in sequence.legs}
-    return keys.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
+    return plan_file.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
 def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
@@ -194,8 +196,10 @@ def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> Join
     from cspr_jax.build.scenes import scene_of
     from cspr_jax.verification.attained import with_attained
 
-    keys = waypoints.plan_file
-    scene = scene_of(problem.robot, waypoints.robot_file, waypoints.frame, keys, waypoints.path, trajectory=keys)
+    plan_file = waypoints.plan_file
+    scene = scene_of(
+        problem.robot, waypoints.robot_file, waypoints.frame, plan_file, waypoints.path, trajectory=plan_file
+    )
     return dataclasses.replace(leg, answers=with_attained(problem, leg.answers, leg.motions, scene))
 
 
@@ -213,21 +217,21 @@ def _causes(frame: Frame, legs: tuple[JoinedLeg, ...]) -> tuple[tuple[Cause, ...
 
 
 def _extremes(
-    problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
+    problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], plan_file: PlanFile
 ) -> Peaks:
     # Heights are in the axes of the robot file.
-    extremes = _peaks(problem, legs, keys, _shape(problem, robot_file, frame, keys))
+    extremes = _peaks(problem, legs, plan_file, _shape(problem, robot_file, frame, plan_file))
     return dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
 
 
-def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile) -> np.ndarray | None:
+def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: PlanFile) -> np.ndarray | None:
     # Corners of the shape of a platform, where it is known.
-    if keys.platform_box is None and keys.platform_hull is None:
+    if plan_file.platform_box is None and plan_file.platform_hull is None:
         return None
     from cspr_jax.build.scenes import scene_of  # few plans have a shape
     from cspr_jax.robots.contacts.contact_bodies import shape_corners
 
-    scene = scene_of(problem.robot, robot_file, frame, keys, Path("plan"), trajectory=keys)
+    scene = scene_of(problem.robot, robot_file, frame, plan_file, Path("plan"), trajectory=plan_file)
     return shape_corners(problem.robot, scene)
 
 
@@ -254,8 +258,8 @@ def _results(
     return tuple(result for result in results if result is not None)
 
 
-def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
-    robot, rule = problem.robot, keys.tensions
+def _check_rule(problem: Problem, plan_file: PlanFile, path: Path) -> None:
+    robot, rule = problem.robot, plan_file.tensions
     if rule is None:
         return
     if robot.n_cables == robot.dof:
@@ -269,32 +273,32 @@ def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
         raise ConfigError(path, f'tensions = "{rule}": must be {others} without tension_max of every cable')
 
 
-def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[str]:
+def _missed(plan_file: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[str]:
     # A rule that is not exact can find no tensions within the limits where there are some.
-    if TENSION_RULES[keys.tension_rule].is_exact:
+    if TENSION_RULES[plan_file.tension_rule].is_exact:
         return []
     missed = np.flatnonzero(is_feasible & (extremes.are_found == 0.0)) + 1
     if not len(missed):
         return []
     names = ", ".join(f"pose[{i}]" for i in missed.tolist())
     return [
-        f'tensions = "{keys.tension_rule}": finds none within their limits somewhere before {names}, where there are '
-        "some: those of least norm stand in for them"
+        f'tensions = "{plan_file.tension_rule}": finds none within their limits somewhere before {names}, where there '
+        "are some: those of least norm stand in for them"
     ]
 
 
-def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Peaks:
+def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], plan_file: PlanFile, corners: np.ndarray | None) -> Peaks:
     motions = [motion for leg in legs for motion in leg.motions]
-    counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
+    counts = np.concatenate([_counts(leg, plan_file) for leg in legs]).tolist()
     # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
-    return peaks(problem.robot, motions, counts, limits, keys.tension_rule, corners)
+    return peaks(problem.robot, motions, counts, limits, plan_file.tension_rule, corners)
 
 
-def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
+def _counts(leg: JoinedLeg, plan_file: PlanFile) -> np.ndarray:
     # Count the instants at which a search for extremes begins.
-    return np.maximum(SAMPLES * leg.answers.tried_arcs, keys.samples) + 1
+    return np.maximum(SAMPLES * leg.answers.tried_arcs, plan_file.samples) + 1
 
 
 def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:

@@ -41,19 +41,19 @@ class PlanLegs:
         ConfigError: poses that their families cannot join.
     """
 
-    def __init__(self, robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
+    def __init__(self, robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
         """Refuse poses that are none, and families that do not move the robot."""
-        _check_families(robot_file, keys, path)
-        _check_keys(keys, path)
-        _check_poses(robot_file, keys, path)
-        frame, last = frame_of(robot_file.base_points, robot_file.z_axis), len(keys.pose) - 1
-        self.waypoints = Waypoints(robot_file, keys, path, frame, keys.family, 0, last)
-        changes = [i for i in range(1, last) if keys.family_of(i) != keys.family_of(i - 1)]
+        _check_families(robot_file, plan_file, path)
+        _check_keys(plan_file, path)
+        _check_poses(robot_file, plan_file, path)
+        frame, last = frame_of(robot_file.base_points, robot_file.z_axis), len(plan_file.pose) - 1
+        self.waypoints = Waypoints(robot_file, plan_file, path, frame, plan_file.family, 0, last)
+        changes = [i for i in range(1, last) if plan_file.family_of(i) != plan_file.family_of(i - 1)]
         self.legs: list[Leg] = []
         for first, after in zip([0, *changes], [*changes, last], strict=True):
-            family = keys.family_of(first)
+            family = plan_file.family_of(first)
             leg = FAMILIES[family].leg(robot_file.own_pattern)
-            plain = leg(Waypoints(robot_file, keys, path, frame, family, first, after))
+            plain = leg(Waypoints(robot_file, plan_file, path, frame, family, first, after))
             if FAMILIES[family].is_searched:
                 plain.begin_with(_others(plain.waypoints))
             self.legs.append(_verified(plain))
@@ -71,7 +71,7 @@ def _verified(leg: Leg) -> Leg:
     waypoints = leg.waypoints
     return verified(
         leg,
-        surroundings=bool(waypoints.plan_file.obstacle_keys),
+        obstacles=bool(waypoints.plan_file.obstacle_keys),
         pulleys=waypoints.robot_file.pulley_radius is not None,
     )
 
@@ -86,9 +86,9 @@ def _others(waypoints: Waypoints) -> list[Leg]:
     return legs
 
 
-def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
-    for i in range(len(keys.pose) - 1):
-        family, pose_family = keys.family_of(i), keys.pose[i + 1].family
+def _check_families(robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
+    for i in range(len(plan_file.pose) - 1):
+        family, pose_family = plan_file.family_of(i), plan_file.pose[i + 1].family
         if robot_file.own_pattern in FAMILIES[family].legs:
             continue
         key = "family" if pose_family is None else f"pose[{i + 1}].family"
@@ -102,20 +102,20 @@ def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
         raise ConfigError(path, f'{key} = "{family}": must be {names} for {robot_file.kind} ("{robot_file.name}"){why}')
 
 
-def _check_keys(keys: PlanFile, path: Path) -> None:
+def _check_keys(plan_file: PlanFile, path: Path) -> None:
     for key in dict.fromkeys(key for row in FAMILIES.values() for key in row.keys):
         families = [name for name, row in FAMILIES.items() if key in row.keys]
-        if getattr(keys, key) is not None and not set(keys.families) & set(families):
+        if getattr(plan_file, key) is not None and not set(plan_file.families) & set(families):
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
 
 
-def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
-    _check_plane(robot_file, keys, path)
-    if keys.beat is not None and not robot_file.is_platform:
-        raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {robot_file.kind}')
-    for i, pose in enumerate(keys.pose):
-        _check_pose_keys(keys, i, path)
-        if pose.position is None and not pose.rest and i not in keys.resulting_poses:
+def _check_poses(robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
+    _check_plane(robot_file, plan_file, path)
+    if plan_file.beat is not None and not robot_file.is_platform:
+        raise ConfigError(path, f'beat = "{plan_file.beat}": must be absent for {robot_file.kind}')
+    for i, pose in enumerate(plan_file.pose):
+        _check_pose_keys(plan_file, i, path)
+        if pose.position is None and not pose.rest and i not in plan_file.resulting_poses:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
         for key in () if robot_file.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:
@@ -124,19 +124,19 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must have y = 0: a planar robot")
 
 
-def _check_pose_keys(keys: PlanFile, i: int, path: Path) -> None:
-    before, after = ({keys.family_of(k)} if 0 <= k < len(keys.pose) - 1 else set() for k in (i - 1, i))
+def _check_pose_keys(plan_file: PlanFile, i: int, path: Path) -> None:
+    before, after = ({plan_file.family_of(k)} if 0 <= k < len(plan_file.pose) - 1 else set() for k in (i - 1, i))
     for attribute, near, where in (
         ("pose_keys", before, "leads there"),
         ("end_keys", before | after, "leads to it or from it"),
     ):
         for key in dict.fromkeys(key for row in FAMILIES.values() for key in getattr(row, attribute)):
             families = [name for name, row in FAMILIES.items() if key in getattr(row, attribute)]
-            if getattr(keys.pose[i], key) is not None and not near & set(families):
+            if getattr(plan_file.pose[i], key) is not None and not near & set(families):
                 raise ConfigError(path, f"pose[{i}].{key}: must be absent unless family = {either(families)} {where}")
 
 
-def _check_plane(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
-    for key, value in keys.vectors.items():
+def _check_plane(robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
+    for key, value in plan_file.vectors.items():
         if robot_file.is_planar and value is not None and value[1] != 0.0:
             raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

@@ -85,9 +85,9 @@ class VerifiedLeg(Leg):
         return leg
 
 
-def verified(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
+def verified(leg: Leg, *, obstacles: bool, pulleys: bool) -> Leg:
     """A leg whose verdicts take surroundings and pulleys into account."""
-    is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (surroundings or pulleys)
+    is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (obstacles or pulleys)
     return VerifiedLeg(leg) if is_needed else leg
 
 

@@ -317,6 +317,6 @@ def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
     # Tensions compare with the weight a cable, lengths with the robot, and others with what is allowed.
     robot = problem.robot
-    weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
-    of_unit = {"N": weight, "m": size, "1": 1.0}
+    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    of_unit = {"N": weight, "m": radius, "1": 1.0}
     return np.array([of_unit.get(row.unit, row.allowed) for row in rows])

@@ -83,8 +83,8 @@ def time_proofs(
     if not count:
         return []
     edges = np.asarray(durations, float)[:, None] * np.linspace(0.0, 1.0, FIRST + 1)
-    places = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
-    start = blocks = _bounded(slacks, *places, whole=None)
+    blocks_at = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
+    start = blocks = _bounded(slacks, *blocks_at, full=None)
     totals, leaves, fails = np.full(count, FIRST), [], np.zeros(count, bool)
     at_jumps = np.concatenate([np.empty(0, complex), *(i + 1j * np.asarray(row) for i, row in enumerate(jumps))])
     while len(blocks.start):
@@ -104,12 +104,12 @@ def time_proofs(
     return _proofs(narrow.take(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
 
 
-def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> TimeBlocks:
+def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, full: BlockSlacks | None) -> TimeBlocks:
     # A part has no looser bounds than the whole.
-    if whole is not None and not len(start):
-        return TimeBlocks(motion, start, end, whole)
+    if full is not None and not len(start):
+        return TimeBlocks(motion, start, end, full)
     blocks = TimeBlocks(motion, start, end, slacks(motion, start, end).complete())
-    return blocks if whole is None else blocks.no_looser_than(whole)
+    return blocks if full is None else blocks.no_looser_than(full)
 
 
 def _usual(high: np.ndarray, count: int) -> np.ndarray:

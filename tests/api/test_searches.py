@@ -24,7 +24,10 @@ from cspr_jax.outputs.plan_report import plan_object
 
 PLACES = np.array([[0.5, 0.3, 1.4], [1.2, 0.2, 1.5], [-0.4, 0.6, 1.3]])
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0], [np.cos(0.1), np.sin(0.1), 0.0, 0.0], [np.cos(0.05), 0.0, 0.0, np.sin(0.05)]])
-OF_THREE = [name for name in catalogue_names() if len(read_robot(CATALOGUE / f"{name}.toml").base_points) == 3]
+SPATIAL = [
+    file for file in (read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()) if not file.is_planar
+]
+OF_THREE = [file.name for file in SPATIAL if len(file.base_points) == 3]
 SOME = ("prototype",)
 FILES = {
     "off-centre": "base_points = [[311.3, -42.8, 7.9], [309.6, -41.9, 8.25], [309.1, -43.8, 8.05]]\nmass = 1.7\n",

@@ -52,10 +52,10 @@ def check_keys(
 
 def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
     if limits is None or isinstance(limits, Mapping):
-        known = [*LimitTable.model_fields, *ObstacleKeys.model_fields]
-        for key in (key for key in limits or {} if key not in known):
+        names = [*LimitTable.model_fields, *ObstacleKeys.model_fields]
+        for key in (key for key in limits or {} if key not in names):
             allowed = demand("a key of [limits] of a plan, or of what surrounds the robot")
-            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), known) + allowed, problem="unknown key")
+            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), names) + allowed, problem="unknown key")
         return plain_values(dict(limits or {}))
     values = {row.name: getattr(limits, row.name) for row in LIMITS}
     numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}

@@ -68,10 +68,10 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
     return function
 
 
-def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
+def warn_of_rest(robot: Any, key: str, position: Any, z0: Any, cure: str) -> None:
     """Warn of a place that differs from P0 only in its last digits."""
-    if np.shape(place) == (3,) and np.shape(z0) == ():
-        line = almost_at_rest(key, np.asarray(place, float).tolist(), float(z0), robot, cure)
+    if np.shape(position) == (3,) and np.shape(z0) == ():
+        line = almost_at_rest(key, np.asarray(position, float).tolist(), float(z0), robot, cure)
         if line:
             warnings.warn(line, stacklevel=5)  # above the check of arguments
 

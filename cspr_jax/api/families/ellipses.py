@@ -61,10 +61,10 @@ def ellipse(
     if isinstance(frequency, str):
         with double_precision():
             problem = Problem(prepared_robot, limits_over(robot, limits, families=("ellipse",)), named("quintic"))
-            place = Ellipse(frame.inward(centre), frame.rotated(a), frame.rotated(b))
-            frequency = chosen_frequency(problem, place, frequency)
-    place = Ellipse(*(jnp.asarray(x, float) for x in (frame.inward(centre), frame.rotated(a), frame.rotated(b))))
-    return Placed(turning(place, jnp.asarray(frequency, float), jnp.asarray(phase, float), turns), frame)
+            ellipse = Ellipse(frame.inward(centre), frame.rotated(a), frame.rotated(b))
+            frequency = chosen_frequency(problem, ellipse, frequency)
+    ellipse = Ellipse(*(jnp.asarray(x, float) for x in (frame.inward(centre), frame.rotated(a), frame.rotated(b))))
+    return Placed(turning(ellipse, jnp.asarray(frequency, float), jnp.asarray(phase, float), turns), frame)
 
 
 @checked(motion="ellipse")
@@ -133,9 +133,9 @@ def _check_robot(robot: PointMassRobot, **vectors) -> None:
 def _many(robot: PointMassRobot, centres, a, b) -> tuple[SpoolHull, Ellipse]:
     _check_robot(robot, centres=centres, a=a, b=b)
     prepared_robot, frame = prepared(robot, pulleys=True)
-    places, count = np.asarray(centres, float), len(centres)
+    positions, count = np.asarray(centres, float), len(centres)
     return hull_of(prepared_robot), Ellipse(
-        frame.inward(places), _axes("a", a, count, frame), _axes("b", b, count, frame)
+        frame.inward(positions), _axes("a", a, count, frame), _axes("b", b, count, frame)
     )
 
 

@@ -180,10 +180,10 @@ def platform_motion(
     """
     prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
-    places = _places(robot, frame, start, end, z0)
+    positions = _places(robot, frame, start, end, z0)
     quaternions = [jnp.asarray(frame.rotated_quaternions(as_float64(one)), float) for one in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
-    first, last = zip(places, quaternions, strict=True)
+    first, last = zip(positions, quaternions, strict=True)
     geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable=variable)), frame)
 

@@ -95,7 +95,7 @@ def least_time_paths(
     Raises:
         InputError: points that make no path, or an impossible argument.
     """
-    keys = checked_plan(check_keys(robot, limits), NAME)
+    spec = checked_plan(check_keys(robot, limits), NAME)
     settings = {
         "kind": kind or "cubic",
         "corner": corner,
@@ -107,15 +107,15 @@ def least_time_paths(
     if not len(paths):
         raise InputError("paths", None, "must hold at least one path", problem="none")
     with double_precision():
-        file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["path"].legs])
-        problem = build_problem(file, keys, keys, NAME, any_cables=True)
+        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["path"].legs])
+        problem = build_problem(file, spec, spec, NAME, any_cables=True)
         axes = frame_of(file.base_points, file.z_axis)
-        reference = reference_of(build_robot(file, keys, NAME))
+        reference = reference_of(build_robot(file, spec, NAME))
         sections = [
             [_placed(file, section, axes, reference) for section in _sections(i, file, table, points, quaternions)]
             for i, points in enumerate(paths)
         ]
-        scene = scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
+        scene = scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
         times = least_times(problem, scene, sections, grid, ramp_time)
     planes = [[section.plane for section in path] for path in times.sections]
     return LeastTimePaths(
@@ -132,23 +132,23 @@ def least_time_paths(
 
 def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternions: Any) -> list[Section]:
     # Sections of one path, in the axes of the robot.
-    places = _numbers(f"paths[{i}]", points, 3)
+    positions = _numbers(f"paths[{i}]", points, 3)
     units = None
     if file.is_platform:
-        units = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
+        units = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1))
         if quaternions is not None:
             name = f"quaternions[{i}]"
             units = _numbers(name, quaternions[i] if i < len(quaternions) else [], 4)
             sizes = np.linalg.norm(units, axis=-1, keepdims=True)
-            if len(units) != len(places) or not (sizes > 0.0).all():
+            if len(units) != len(positions) or not (sizes > 0.0).all():
                 raise InputError(
-                    name, None, f"must be {len(places)}, none of them zero", problem=f"{len(units)} of them"
+                    name, None, f"must be {len(positions)}, none of them zero", problem=f"{len(units)} of them"
                 )
             units = units / sizes
     elif quaternions is not None:
         raise InputError("quaternions", None, "must be absent for a point mass", problem="given")
     try:
-        return path_through(table, places, units).sections()
+        return path_through(table, positions, units).sections()
     except InputError as error:
         raise InputError(f"paths[{i}], {error.key}", error.value, error.allowed, problem=error.problem) from error
 

@@ -172,8 +172,8 @@ def attainable(
             raise InputError("place", np.asarray(place).tolist(), "a place where some orientation is accessible")
         checker = pose_checker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
         depth = depths(where[2] if z0 is None else z0, count)
-        places = np.tile(where, (count, 1))
-        return inside, search_attainable(checker, places, inside.angles, depth, max_arcs=max_arcs)
+        positions = np.tile(where, (count, 1))
+        return inside, search_attainable(checker, positions, inside.angles, depth, max_arcs=max_arcs)
 
 
 def _of_place(

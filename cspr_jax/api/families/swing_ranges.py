@@ -52,10 +52,10 @@ def swing_range(
     ranges = release_ranges(release_x, release_y, release_z)
     with double_precision():
         prepared_robot, frame = prepared(robot, pulleys=True)
-        known = limits_over(robot, limits)
-        if other_limit(known) is not None:
-            raise InputError("limits", other_limit(known), "a floor alone")
+        names = limits_over(robot, limits)
+        if other_limit(names) is not None:
+            raise InputError("limits", other_limit(names), "a floor alone")
         box = box_of(prepared_robot, frame, ranges)
-        floor = None if known.floor is None else float(known.floor)
+        floor = None if names.floor is None else float(names.floor)
         releases = slowest_releases(prepared_robot, frame.inward(starts), frame.inward(ends), box, floor)
         return releases.placed(frame)

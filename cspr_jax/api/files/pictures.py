@@ -105,12 +105,12 @@ def sources_beside(plan: str | Path | None, robot: AnyRobot | str | Path | None,
     options = [option for option, value in sources.items() if value is not None]
     if len(options) > 1:
         raise ConfigError(options[1], f"must be absent with {options[0]}, which says it")
-    keys = None
+    spec = None
     if robot is not None:
         from cspr_jax.api.arguments.check_keys import check_keys
 
-        keys = check_keys(robot, None)
-    return {"plan": None if plan is None else Path(plan), "robot": keys, "z_axis": z_axis}
+        spec = check_keys(robot, None)
+    return {"plan": None if plan is None else Path(plan), "robot": spec, "z_axis": z_axis}
 
 
 def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:

@@ -109,19 +109,19 @@ def report(
     return warnings
 
 
-def _is_own(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> bool:
+def _is_own(source: str | Path | Result | Plan, spec: dict[str, Any] | None) -> bool:
     # A motion of the user's own, and its robot.
-    if keys is None or isinstance(source, Result | Plan) or Path(source).suffix == ".toml":
+    if spec is None or isinstance(source, Result | Plan) or Path(source).suffix == ".toml":
         return False
     return is_own_motion(Path(source))
 
 
-def _loaded(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> Result | Plan:
+def _loaded(source: str | Path | Result | Plan, spec: dict[str, Any] | None) -> Result | Plan:
     if isinstance(source, Result | Plan):
         return source
     path = Path(source)
-    if keys is not None and _is_own(source, keys):
-        return check_file(path, keys, outputs=["-o"]).plan
+    if spec is not None and _is_own(source, spec):
+        return check_file(path, spec, outputs=["-o"]).plan
     if path.suffix == ".toml":
         return plans.plan(path)
     stage("reading")
@@ -132,10 +132,10 @@ def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], l
     if isinstance(motion, Plan):
         robot, content, feasible = shortened(motion.robot_file.name), _planned(motion, "motion"), motion.feasible
     else:
-        robot_file, keys = robot_and_plan(motion, name, "report") if keeps_plan(motion) else (None, None)
+        robot_file, spec = robot_and_plan(motion, name, "report") if keeps_plan(motion) else (None, None)
         robot, columns = robot_name(motion), motion.axes | motion.data
         content = motion_content(
-            "motion", columns, motion.data, robot_file, keys, motion.attributes.get("z_axis", "down")
+            "motion", columns, motion.data, robot_file, spec, motion.attributes.get("z_axis", "down")
         )
         feasible = bool(motion.attributes.get("feasible", 1))
     doubt = "" if feasible else "not proved feasible"
@@ -203,8 +203,8 @@ def _first(shape: list[int], flat: str | None) -> list[int]:
     return [int(i) for i in np.unravel_index(int(flat), shape)]
 
 
-def _rank(points: np.ndarray, chosen: np.ndarray, place: int) -> int:
-    return int(np.searchsorted(points[chosen], points[place]))
+def _rank(points: np.ndarray, chosen: np.ndarray, cell: int) -> int:
+    return int(np.searchsorted(points[chosen], points[cell]))
 
 
 def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
@@ -215,18 +215,18 @@ def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
 
 def _words(result: Result, index: tuple[int, ...]) -> str:
     points = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
-    place = result.coordinates(index)
-    return ", ".join(value(result, axis, place[axis]) for axis, coordinates in points.items() if len(coordinates) > 1)
+    cell = result.coordinates(index)
+    return ", ".join(value(result, axis, cell[axis]) for axis, coordinates in points.items() if len(coordinates) > 1)
 
 
 def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:
-    place = result.coordinates(index)
+    cell = result.coordinates(index)
     values = {name: data[index] for name, data in result.data.items()}
-    keys = cell_plan(result.settings, place, values)
-    if keys is None:
+    spec = cell_plan(result.settings, cell, values)
+    if spec is None:
         return None
     stage("motions of cells")
-    planned = plans.plan(keys)
+    planned = plans.plan(spec)
     if not np.isfinite(planned.answers.duration).all():
         return None
     return _planned(planned, _words(result, index))

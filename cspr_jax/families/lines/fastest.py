@@ -102,10 +102,10 @@ def _fastest(
     # If an end breaks a limit, no other motion helps.
     indices = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(indices) > 0:
-        before, places = timings.part(indices), (starts[indices], ends[indices])
-        searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
-        reasons = _without_motion(problem, verdicts_of, *places, searched, judgements.verdict[indices])
-        durations, part = _proved(verdicts_of, *places, searched, reasons)
+        before, positions = timings.part(indices), (starts[indices], ends[indices])
+        searched = by_search(problem, *positions, before, law=law, max_acceleration=max_acceleration)
+        reasons = _without_motion(problem, verdicts_of, *positions, searched, judgements.verdict[indices])
+        durations, part = _proved(verdicts_of, *positions, searched, reasons)
         judgements.replace(indices, part)
         timings.replace(indices, durations)
     moves = may_move & np.isfinite(timings.duration)

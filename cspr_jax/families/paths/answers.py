@@ -91,14 +91,14 @@ class SectionAnswer(NamedTuple):
 
 def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
     # Tell what binds, the longest first, over cells that take these times.
-    shares, total = dict[BindingName, float](), 0.0
+    fractions, total = dict[BindingName, float](), 0.0
     for minimum, times in parts:
         total += float(times.sum())
         for k, name in enumerate(minimum.names):
-            shares[name] = shares.get(name, 0.0) + float(times[minimum.binds == k].sum())
-    order = sorted((name for name in shares if shares[name] > 0.0), key=lambda name: -shares[name])
+            fractions[name] = fractions.get(name, 0.0) + float(times[minimum.binds == k].sum())
+    order = sorted((name for name in fractions if fractions[name] > 0.0), key=lambda name: -fractions[name])
     return [
-        {"criterion": name.criterion, "cable": name.cable, "words": name.words, "share": shares[name] / total}
+        {"criterion": name.criterion, "cable": name.cable, "words": name.words, "share": fractions[name] / total}
         | ({"feed": name.feed} if name.feed else {})
         for name in order[:MOST_BINDING]
     ]
@@ -202,13 +202,13 @@ class PathAnswers(Answers):
 
     def notes(self, key: str = "path.ramp_time") -> list[str]:
         """Say in one line where ramps are shorter than they are to be."""
-        known = self.every_section()
-        missing = [s for s in known if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
+        sections = self.every_section()
+        missing = [s for s in sections if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
         if not missing:
             return []
         jumping = sum(section.least.ramp_time == 0.0 for section in missing)
         shortest = min((s.least.ramp_time for s in missing if s.least.ramp_time > 0.0), default=0.0)
-        where = f" in {len(missing)} of {len(known)} sections" if len(known) > 1 else ""
+        where = f" in {len(missing)} of {len(sections)} sections" if len(sections) > 1 else ""
         words = [f"shorter ones, of {_shown(shortest)} s or more, stand in for them"] if shortest else []
         words += ["accelerations jump" + (f" in {jumping}" if jumping < len(missing) else "")] if jumping else []
         return [
@@ -217,18 +217,18 @@ class PathAnswers(Answers):
 
     def causes_of(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """Places that no path speed passes, then what no other speed mends; see `Answers.causes_of`."""
-        usual, places, before = super().causes_of(i, frame), list[Cause](), 0.0
+        usual, causes, before = super().causes_of(i, frame), list[Cause](), 0.0
         for section in self.sections[i]:
             times, failure = section.times(i), section.least.failure
             if failure is not None:
                 node = int(np.argmin(np.abs(section.least.coordinate - failure.coordinate)))
                 is_inside = section.segments[min(node, len(times) - 1)] == i
                 t = before + float(times[:node].sum()) if is_inside else math.nan
-                places.append(_cause_of(failure, t, usual[0], frame))
+                causes.append(_cause_of(failure, t, usual[0], frame))
             before += float(times.sum())
-        if not places:
+        if not causes:
             return usual
-        return (*places, *(cause for cause in usual if not Verdict[cause.criterion.upper()] & OF_SPEED))
+        return (*causes, *(cause for cause in usual if not Verdict[cause.criterion.upper()] & OF_SPEED))
 
 
 def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCause:
