@@ -106,7 +106,7 @@ class Verifier(NamedTuple):
         """Columns of a map whose motions keep clear of obstacles, as the plan of each cell says."""
         answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=step, max_arcs=max_arcs)
         clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
-        return vars(answers) | {"clearance": clearance}
+        return answers.arrays() | {"clearance": clearance}
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
         # Verify the motions of a family: without pulleys those that it proves.

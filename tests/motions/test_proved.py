@@ -21,10 +21,9 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification import proved
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 from cspr_jax.verification.criteria import Criterion
-from cspr_jax.verification.proved_answers import MotionProof, proved_answers
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, proved_answers
 from cspr_jax.verification.time_proof import time_proof
 
 COUNT = 12
@@ -109,8 +108,8 @@ def test_platforms_on_six_cables_get_the_verdict_of_their_own_proof():
 def test_a_motion_in_reverse_has_the_same_answer():
     problem = problem_of()
     _, _, motions = swings(problem, 5)
-    there, back = (proved.proved(problem, motion) for motion in (motions[0], Backwards(motions[0])))
-    assert there.verdict == back.verdict and there.bound == pytest.approx(back.bound, rel=0.03)
+    there, back = (proof_of(problem, motion) for motion in (motions[0], Backwards(motions[0])))
+    assert there.verdict == back.verdict and there.margin_bound == pytest.approx(back.margin_bound, rel=0.03)
 
 
 def test_what_fails_is_named_with_its_instant():
@@ -121,10 +120,10 @@ def test_what_fails_is_named_with_its_instant():
         low, high = 0.5 * time - end, 0.5 * time - start
         return BlockSlacks(np.stack([low, 0.0 * low - 1.0], 1), np.stack([high, 0.0 * high + 1.0], 1))
 
-    proof = proved.summary(MotionProof(rows, time_proof(slacks, time), np.ones(2)), 1.0)
-    assert proof.verdict == Verdict.OVER_TENSION.value
-    assert proof.instant == pytest.approx(0.75 * time, abs=1e-3 * time)
-    assert proof.bound == pytest.approx(-0.5 * time) and proof.room == np.inf
+    proof = MotionProof(rows, time_proof(slacks, time), np.ones(2))
+    assert proof.verdict == Verdict.OVER_TENSION
+    np.testing.assert_allclose(proof.failing, [[0.5 * time, time]], atol=1e-4)
+    assert proof.margin_bound == pytest.approx(-0.5 * time)
 
 
 def test_one_open_criterion_leaves_a_motion_undecided():
@@ -133,12 +132,12 @@ def test_one_open_criterion_leaves_a_motion_undecided():
     def slacks(start, end):
         return BlockSlacks(np.tile([1.0, -1.0], (len(start), 1)), np.ones((len(start), 2)))
 
-    proof = proved.summary(MotionProof(rows, time_proof(slacks, 2.0), np.ones(2)), 1.0)
-    assert proof.verdict == Verdict.UNDECIDED.value and np.isnan(proof.instant)
+    proof = MotionProof(rows, time_proof(slacks, 2.0), np.ones(2))
+    assert proof.verdict == Verdict.UNDECIDED and len(proof.failing) == 0
 
 
-def test_no_duration_is_no_motion():
+def test_nothing_is_proved_of_a_motion_without_a_duration():
     problem = problem_of()
     motion = swings(problem, 5)[2][0]
     still = dataclasses.replace(motion, arcs=as_float64(np.nan))
-    assert proved.proved(problem, still).verdict == Verdict.NOT_FINITE.value
+    assert proof_of(problem, still).verdict == Verdict.UNDECIDED

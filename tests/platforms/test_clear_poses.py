@@ -144,7 +144,7 @@ def test_plans_of_platforms_among_obstacles(name):
     assert free.feasible
     beside = cspr_jax.plan(alone | {"obstacle": ball(centre.tolist(), 0.97 * nearest)})
     assert beside.feasible and not beside.causes[0]
-    assert beside.legs[0].answers.proofs[0].proof.high.min() == pytest.approx(0.03 * nearest, abs=2e-3 * nearest)
+    assert beside.legs[0].answers.proof[0].proof.high.min() == pytest.approx(0.03 * nearest, abs=2e-3 * nearest)
     met = cspr_jax.plan(alone | {"obstacle": ball(centre.tolist(), 1.05 * nearest)})
     (cause,) = met.causes[0]
     assert Verdict(int(met.answers.verdict[0])) == Verdict.OBSTACLE and not met.feasible

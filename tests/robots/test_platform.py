@@ -211,7 +211,7 @@ def test_ends(robot):
         second_derivative = float(rng.uniform(-4.0, 2.0))
         segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, second_derivative), 5)
         at = cables_at(package, states(segment, EFFECTIVE, 5, np.ones(1)))
-        promised = np.asarray(found.offset) + second_derivative * np.asarray(found.slope)
+        promised = np.asarray(found.offset) + second_derivative * np.asarray(found.derivative)
         np.testing.assert_allclose(at["per_length"][0], promised, rtol=1e-7, atol=1e-8)
     rest = end_of(package, *random_pose(rng, rest=True), np.asarray(Z0))
     assert float(rest.preferred) == -1.0

@@ -254,7 +254,7 @@ def test_parts_are_put_together_in_order(monkeypatch):
     ]
     monkeypatch.setattr("cspr_jax.families.swings.arcs.PART", 80)
     whole = answer(starts, ends, z0=z0, arcs=arcs)
-    for name, values in vars(whole).items():
+    for name, values in whole.arrays().items():
         np.testing.assert_array_equal(values, np.concatenate([getattr(piece, name) for piece in pieces]), err_msg=name)
 
 

@@ -63,7 +63,7 @@ def test_cells_are_what_plans_say(result):
         plan = cspr_jax.plan(cell_plan(settings, place, {}))
         for name in ("arcs", "tried_arcs", "verdict", "duration", "margin"):
             assert cell[name] == getattr(plan.answers, name)[0], name
-        proof = plan.legs[0].answers.proofs[0]
+        proof = plan.legs[0].answers.proof[0]
         assert cell["clearance"] == pytest.approx(float(proof.proof.high.min()), rel=0.01, abs=1e-6)
 
 

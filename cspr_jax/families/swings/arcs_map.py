@@ -35,7 +35,7 @@ class MinimumArcsMap(PointMassMap):
         points, max_arcs = (self._starts(cells), self._targets(cells), cells["z0"]), self._keys.trajectory.max_arcs
         settings: dict[str, Any] = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
         if self._scene is None:
-            return vars(minimum_arcs(self._problem, *points, **settings))
+            return minimum_arcs(self._problem, *points, **settings).arrays()
         # Maps without obstacles need no proofs of any motion.
         from cspr_jax.verification.bounds.batch import MotionBatch
         from cspr_jax.verification.verifier import Verifier

@@ -172,7 +172,7 @@ class OrientationsMap(AttainabilityMap):
             answers = self._attainable(
                 positions[accessible_cells], angles[accessible_cells], z0[accessible_cells], margins=True
             )
-            columns = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+            columns = answers.arrays() | {"beta_hat": answers.beta_hat[:, 1]}
             for name, values in results.items():
                 values[accessible_cells] = columns[name]
         return results

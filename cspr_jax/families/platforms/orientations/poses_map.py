@@ -49,7 +49,7 @@ class PosesMap(PlatformMap):
         ends = (targets, orientations(self._frame, targets, angles))
         cell = np.arange(len(z0))
         motions = Candidates(starts, ends, z0, cell, (beta_hats, beta_hats))
-        columns = vars(self._answers(motions)) if self._scene is None else self._clear(motions)
+        columns = self._answers(motions).arrays() if self._scene is None else self._clear(motions)
         return columns | {"beta_hat": columns["beta_hat"][:, 1]}
 
     def _answers(self, motions: Candidates, arcs: np.ndarray | None = None) -> PlatformMotionAnswers:
