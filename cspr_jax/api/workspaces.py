@@ -105,15 +105,15 @@ def workspace(  # noqa: PLR0913
     for key, value in (*requirements.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
-    places = points_of("positions", positions)
-    check_in_plane("positions", places, is_planar=PATTERNS[robot.pattern].is_planar)
+    points = points_of("positions", positions)
+    check_in_plane("positions", points, is_planar=PATTERNS[robot.pattern].is_planar)
     with double_precision():
         centred_robot, frame = centred(robot)
         limits = _limits(robot, tension_min, tension_max)
         loads = required_wrenches(
             centred_robot, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
-        inner, turns = _poses(centred_robot, frame, places, orientations, point or "origin")
+        inner, turns = _poses(centred_robot, frame, points, orientations, point or "origin")
         posed = requirement(centred_robot, condition, limits, loads, capacity_length)
         return WorkspaceSearch(centred_robot, posed, precision=precision)(inner, turns)
 
@@ -207,20 +207,20 @@ def sensitivity(
             values that are not finite, quaternions that are not of unit length, or orientations of a point mass.
     """
     _check_kind(robot)
-    places = points_of("positions", positions)
-    check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
+    points = points_of("positions", positions)
+    check_in_plane("positions", points, is_planar=robot.dof == PLANAR)
     if orientations is not None and isinstance(robot, PointMassRobot):
         raise InputError("orientations", None, "must be None", problem="a point mass has none")
     with double_precision():
         centred_robot, frame = centred(robot)
         turns = None
         if orientations is not None:
-            turns = frame.rotated_quaternions(quaternions("orientations", orientations, len(places)))
-        search, inner = SensitivitySearch(centred_robot), np.asarray(frame.inward(places))
+            turns = frame.rotated_quaternions(quaternions("orientations", orientations, len(points)))
+        search, inner = SensitivitySearch(centred_robot), np.asarray(frame.inward(points))
         if point == "origin":
             inner = mass_centres(search.robot, inner, turns)
         answers = search(inner, turns)
-    return Sensitivity(places, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
+    return Sensitivity(points, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
 
 
 @checked()
@@ -278,7 +278,7 @@ class AvailableAccelerations:
         Raises:
             InputError: the wrong shape, or not finite.
         """
-        return self._judged(accelerations)[0]
+        return self._verdicts(accelerations)[0]
 
     @checked()
     def verdict(self, accelerations: VectorOrVectors) -> np.ndarray:
@@ -294,9 +294,9 @@ class AvailableAccelerations:
         Raises:
             InputError: the wrong shape, or not finite.
         """
-        return self._judged(accelerations)[1].astype(FLAGS)
+        return self._verdicts(accelerations)[1].astype(FLAGS)
 
-    def _judged(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
+    def _verdicts(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
         vectors = np.asarray(accelerations, float)
         if vectors.shape not in ((3,), self.positions.shape):
             allowed = f"finite numbers of shape (3,) or {self.positions.shape}"
@@ -330,14 +330,14 @@ def available_accelerations(
             contradict each other.
     """
     check_point_mass(robot)
-    places = points_of("positions", positions)
-    check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
+    points = points_of("positions", positions)
+    check_in_plane("positions", points, is_planar=robot.dof == PLANAR)
     with double_precision():
         tensions: dict[str, Any] = {"tension_min": tension_min, "tension_max": tension_max}
         limits = limits_over(robot, Limits(**tensions))
         prepared_robot, frame = prepared(robot)
         allowed = touchable_limits(prepared_robot, limits)
-        faces, wider = (faces_of(prepared_robot, each, frame.inward(places)) for each in (limits, allowed))
+        faces, wider = (faces_of(prepared_robot, each, frame.inward(points)) for each in (limits, allowed))
     cables = np.tile(spanning(robot.n_cables, robot.dof), (2, 1))
     normals, offsets, of_largest = map(np.asarray, (frame.rotated(faces.normals), faces.offsets, faces.of_largest))
-    return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, wider, frame)
+    return AvailableAccelerations(points, normals, offsets, cables, of_largest, prepared_robot, faces, wider, frame)

@@ -12,6 +12,7 @@ from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene, scene
@@ -81,3 +82,9 @@ def scene_of(
     written = centred(build_robot(robot_file, trajectory, file))[0]
     rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
     return build_scene(robot, robot_file, frame, spec, file, rotation=rotation)
+
+
+def scene_of_leg(robot: AnyRobot, waypoints: Waypoints) -> Scene:
+    """Scene of the robot of a problem in a leg of a plan."""
+    plan_file = waypoints.plan_file
+    return scene_of(robot, waypoints.robot_file, waypoints.frame, plan_file, waypoints.path, trajectory=plan_file)

@@ -61,7 +61,7 @@ class GridMap(abc.ABC):
             any_cables=self.any_cables,
         )
 
-    def _surroundings(self, robot_file: RobotFile) -> Any:
+    def _scene_or_none(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None: it has neither obstacles nor a shape of the platform.
         if not self._keys.obstacle_keys:
             return None

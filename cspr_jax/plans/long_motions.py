@@ -39,7 +39,7 @@ class _Window(NamedTuple):
     start: float
     duration: float
     proof: MotionProof
-    demands: Peaks
+    peaks: Peaks
     interpolation: str
     ends: str
 
@@ -55,12 +55,12 @@ def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
         raise ConfigError(path, "uncertainty: must be absent in a table of so many rows")
     frame, notes = frame_of(robot_file.base_points, robot_file.z_axis), dict[str, None]()
     try:
-        windows = list(_judged(problem, robot_file, frame, plan_file, path, notes))
+        windows = list(_windows(problem, robot_file, frame, plan_file, path, notes))
     except InputError as error:
         raise ConfigError(path, str(error)) from error
     duration = np.array([windows[-1].start + windows[-1].duration])
     answers = answers_of([_merged(windows)], duration)
-    extremes = _reduced([window.demands for window in windows], [window.start for window in windows])
+    extremes = _reduced([window.peaks for window in windows], [window.start for window in windows])
     return PlannedMotions(
         robot_file=robot_file,
         keys=plan_file.model_copy(update={"interpolation": windows[0].interpolation, "ends": windows[0].ends or None}),
@@ -75,7 +75,7 @@ def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
     )
 
 
-def _judged(
+def _windows(
     problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: PlanFile, path: Path, notes: dict[str, None]
 ) -> Iterator[_Window]:
     scene = scene_of(problem.robot, robot_file, frame, plan_file, path, trajectory=plan_file)

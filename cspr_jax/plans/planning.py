@@ -193,13 +193,10 @@ def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> Join
     if leg.answers.feasible.all() and not any(proof is not None for proof in leg.answers.proof):
         return leg
     # Feasible plans of such families need none of these.
-    from cspr_jax.build.scenes import scene_of
+    from cspr_jax.build.scenes import scene_of_leg
     from cspr_jax.verification.attained import with_attained
 
-    plan_file = waypoints.plan_file
-    scene = scene_of(
-        problem.robot, waypoints.robot_file, waypoints.frame, plan_file, waypoints.path, trajectory=plan_file
-    )
+    scene = scene_of_leg(problem.robot, waypoints)
     return dataclasses.replace(leg, answers=with_attained(problem, leg.answers, leg.motions, scene))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.build.scenes import scene_of
+from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion
@@ -50,14 +50,7 @@ class VerifiedLeg(Leg):
         waypoints, plain, prescribed = self.waypoints, _from_points(problem), self.waypoints.arcs
         verifier = Verifier(
             problem,
-            scene_of(
-                problem.robot,
-                waypoints.robot_file,
-                waypoints.frame,
-                waypoints.plan_file,
-                waypoints.path,
-                trajectory=waypoints.plan_file,
-            ),
+            scene_of_leg(problem.robot, waypoints),
         )
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 

@@ -28,13 +28,13 @@ class Verdicts:
         margin: smallest slack of taut cables that is attained: of lines a distance from faces, m/s^2; of Bezier
             segments without a unit, the depth below the spools included.
         bound: proved lower bound of the margin.
-        room: smallest slack of the limits, without a unit; inf without limits.
+        limit_margin: smallest slack of the limits, without a unit; inf without limits.
     """
 
     verdict: np.ndarray
     margin: np.ndarray
     bound: np.ndarray
-    room: np.ndarray
+    limit_margin: np.ndarray
 
     def replace(self, rows: np.ndarray, part: "Verdicts") -> None:
         """Replace the verdicts of some of the motions."""
@@ -42,11 +42,13 @@ class Verdicts:
             getattr(self, name)[rows] = values
 
 
-def with_touched(problem: Problem, strict: Verdicts, judged: Callable[[Problem, np.ndarray], Verdicts]) -> Verdicts:
+def with_touched(
+    problem: Problem, strict: Verdicts, verdicts_of: Callable[[Problem, np.ndarray], Verdicts]
+) -> Verdicts:
     """Verdicts, of which those of motions that may touch a limit are by the wider limits of proofs; margins stay."""
-    rows = np.flatnonzero((strict.verdict != 0) & (np.abs(strict.room) < NEARLY))
+    rows = np.flatnonzero((strict.verdict != 0) & (np.abs(strict.limit_margin) < NEARLY))
     if len(rows):
-        strict.verdict[rows] = judged(touchable(problem), rows).verdict
+        strict.verdict[rows] = verdicts_of(touchable(problem), rows).verdict
     return strict
 
 

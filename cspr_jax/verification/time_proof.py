@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FIRST = 32
 CLOSE = 0.002
 # Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
-MOST, NARROWING = 100_000, 4_000
+MAX_BLOCKS, NARROWING = 100_000, 4_000
 # TimeBlocks that narrow a margin are no shorter than this part of the resolution.
 SHORTEST = 1e-3
 
@@ -93,7 +93,7 @@ def time_proofs(
         if not intervals:
             fails |= np.bincount(blocks.motion, (blocks.slacks.high < level).any(1), count) > 0.0
             is_open &= ~fails[blocks.motion]
-        is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
+        is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MAX_BLOCKS
         leaves.append(blocks.take(~is_open))
         first, last = blocks.rest(np.asarray(level), undecided, has_upper=True)
         outside, inner = blocks.take(is_open).cut(first[is_open], last[is_open], at_jumps)
@@ -117,7 +117,7 @@ def _usual(high: np.ndarray, count: int) -> np.ndarray:
     return np.median(np.where(np.isfinite(high), np.abs(high), 0.0).reshape(count, FIRST, -1), axis=1)
 
 
-def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+def _smallest(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     # Smallest values of each motion, (count, n_criteria), inf for a motion without any.
     minimum = np.full((count, values.shape[1]), np.inf)
     if len(motion):
@@ -138,7 +138,7 @@ def _narrowed(
     # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
-    minimum = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
+    minimum = _grouped(_smallest(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
         # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
         with np.errstate(invalid="ignore"):  # of bounds that are infinite
@@ -152,22 +152,22 @@ def _narrowed(
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)
-        minimum = np.minimum(minimum, _grouped(_least(blocks.motion, blocks.slacks.high, count), groups))
+        minimum = np.minimum(minimum, _grouped(_smallest(blocks.motion, blocks.slacks.high, count), groups))
     return joined(leaves), more
 
 
-def _grouped(least: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
+def _grouped(values: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
     # The smallest value of the group of each column.
     if groups is None or not len(groups):
-        return least
-    smallest = np.full((len(least), int(groups.max()) + 1), np.inf)
-    np.minimum.at(smallest.T, groups, least.T)
+        return values
+    smallest = np.full((len(values), int(groups.max()) + 1), np.inf)
+    np.minimum.at(smallest.T, groups, values.T)
     return smallest[:, groups]
 
 
 def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -> list[TimeProof]:
     count = len(totals)
-    low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
+    low, high = (_smallest(blocks.motion, side, count) for side in blocks.slacks[:2])
     failing = [_merged(blocks, column, count) for column in (blocks.slacks.high < level).T]
     is_open = [_merged(blocks, column, count) for column in blocks.undecided(np.asarray(level)).T]
     proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))

@@ -102,9 +102,9 @@ class Verifier(NamedTuple):
         feasible = np.where(verdict & ~FEWER == 0, answers.tried_arcs, 0)
         return VerifiedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
 
-    def columns(self, join: Join, count: int, *, max_arcs: int, step: int = 1) -> dict[str, np.ndarray]:
+    def columns(self, join: Join, count: int, *, max_arcs: int) -> dict[str, np.ndarray]:
         """Columns of a map whose motions keep clear of obstacles, as the plan of each cell says."""
-        answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=step, max_arcs=max_arcs)
+        answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=1, max_arcs=max_arcs)
         clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
         return answers.arrays() | {"clearance": clearance}
 

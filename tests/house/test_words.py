@@ -39,7 +39,7 @@ PUBLIC = {
 }
 # How many there are still: to be lowered by who removes some, and never to be raised.
 ALLOWED = {"names": 7, "docstrings": 0, "comments": 0}
-ALLOWED_RETIRED = 28
+ALLOWED_RETIRED = 8
 FRAGMENT = re.compile(r"(Of|What|Where|Whether|Those)\b")
 
 

@@ -45,9 +45,9 @@ def check_keys(
     robot: AnyRobot | str | Path, limits: Limits | Mapping[str, Any] | None, **settings: Any
 ) -> dict[str, Any]:
     """Keys of the plan of a motion that is checked."""
-    keys: dict[str, Any] = {"schema": 1, "family": "spline", "motion": str(NAME)}
-    keys["robot"] = str(robot) if isinstance(robot, str | Path) else robot_table(robot)
-    return keys | {name: value for name, value in settings.items() if value is not None} | _limit_keys(limits)
+    spec: dict[str, Any] = {"schema": 1, "family": "spline", "motion": str(NAME)}
+    spec["robot"] = str(robot) if isinstance(robot, str | Path) else robot_table(robot)
+    return spec | {name: value for name, value in settings.items() if value is not None} | _limit_keys(limits)
 
 
 def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:

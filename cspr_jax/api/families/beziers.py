@@ -134,7 +134,7 @@ def bezier_verdicts(
         problem, frame = kernel_problem(robot, "quintic", limits, free_end=None, any_cables=True)
         first, middle, last = (np.asarray(frame.inward(x)) for x in points)
         answers = verdicts(problem, Bezier(first, middle, last, times, depths_of(problem.robot, first)))
-        return BezierVerdicts(answers.verdict, answers.margin, answers.bound, answers.room)
+        return BezierVerdicts(answers.verdict, answers.margin, answers.bound, answers.limit_margin)
 
 
 @checked(motion="bezier")

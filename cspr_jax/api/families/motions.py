@@ -110,7 +110,7 @@ def hypocycloid(
     """
     prepared_robot, frame = _prepared(robot, ("3T",), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
-    first, last = _places(robot, frame, start, end, z0)
+    first, last = _inward_positions(robot, frame, start, end, z0)
     geometry = segment(prepared_robot, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(Hypocycloid(geometry, function, p), frame)
 
@@ -180,7 +180,7 @@ def platform_motion(
     """
     prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
-    positions = _places(robot, frame, start, end, z0)
+    positions = _inward_positions(robot, frame, start, end, z0)
     quaternions = [jnp.asarray(frame.rotated_quaternions(as_float64(one)), float) for one in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(positions, quaternions, strict=True)
@@ -220,7 +220,7 @@ def spline(
     """
     samples = [array for array in (positions, velocities, accelerations) if array is not None]
     options = {"interpolation": interpolation, "ends": ends}
-    if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(samples)):
+    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(samples)):
         return _spline(robot, times, quaternions, samples, **options)
     # Orientations and knots do not depend on them; coefficients are linear in them.
     arrays = [jnp.asarray(array, float) for array in samples]
@@ -302,7 +302,7 @@ def sampled_margin(problem: Problem, motion: Motion, samples: Samples = 64) -> A
     return _MARGIN(problem, _inner(motion), samples=samples)
 
 
-def _places(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
+def _inward_positions(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
     # In the kernels' axes. Of what jax traces nobody knows where it is.
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((robot, start, end, z0))):
         if start is not None:

@@ -79,14 +79,14 @@ def minimum_pose_arcs(  # noqa: PLR0913
     """
     if not isinstance(robot, PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a platform")
-    places = points_of("positions", positions)
-    depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
+    points = points_of("positions", positions)
+    depth, turns = depths(z0, len(points)), quaternions("orientations", orientations, len(points))
     with double_precision():
         problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",), any_cables=True)
         for each in np.unique(depth if robot.n_cables == robot.dof else depth[:0]):
             reference_pose(problem.robot, float(each))
         checker = pose_checker(problem, PlatformMotionKind(variable=variable, from_rest=start is None), batch=MANY)
-        ends = (frame.inward(places), frame.rotated_quaternions(turns))
+        ends = (frame.inward(points), frame.rotated_quaternions(turns))
         if start is None:
             first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
         else:

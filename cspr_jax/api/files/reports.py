@@ -38,7 +38,7 @@ ResultOrPlan = Annotated[
     str | Path | Result | Plan, Kind("a result, a plan, or the path of one", (str, os.PathLike), ("to_xarray",))
 ]
 # Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
-USUAL, MOST, RATE, STEP = 50, 500, 60.0, 100
+USUAL, MAX_TRAJECTORIES, RATE, STEP = 50, 500, 60.0, 100
 
 
 @checked()
@@ -83,8 +83,8 @@ def report(
     if output.suffix != ".html":
         raise ConfigError("-o", f"{output}: must end in .html")
     check_writable(output)
-    if not 0 <= trajectories <= MOST:
-        raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
+    if not 0 <= trajectories <= MAX_TRAJECTORIES:
+        raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MAX_TRAJECTORIES}")
     try:
         beside = sources_beside(plan, robot, z_axis)
         loaded = _loaded(given, beside["robot"])
@@ -164,7 +164,7 @@ def _of_map(
 ) -> tuple[str, dict[str, Any], list[str]]:
     content, left = map_content(result, quantity)
     indices = [
-        tuple(nearest(result, axis, chosen)[0] for axis, chosen in _places(result, cell).items()) for cell in cells
+        tuple(nearest(result, axis, chosen)[0] for axis, chosen in _cell_axes(result, cell).items()) for cell in cells
     ]
     warnings = [f"left out, for a page of all would be too large: {', '.join(left)}"] if left else []
     if MAP_KINDS[result.attributes["map"]].planned and "verdict" in result.data:
@@ -178,9 +178,9 @@ def _of_map(
         if planned is None:
             warnings.append(f"{_words(result, index)}: no motion, its numbers are not finite")
             continue
-        place = dict(zip(result.axes, index, strict=True))
+        coordinates = dict(zip(result.axes, index, strict=True))
         # If a point occurs twice, the page shows the first.
-        same = [_rank(result.axes[name], chosen, place[name]) for name, chosen in zip(names, points, strict=True)]
+        same = [_rank(result.axes[name], chosen, coordinates[name]) for name, chosen in zip(names, points, strict=True)]
         motion_of_cell[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
         motions.append(planned)
     first = next(iter(motion_of_cell), None)
@@ -207,7 +207,7 @@ def _rank(points: np.ndarray, chosen: np.ndarray, cell: int) -> int:
     return int(np.searchsorted(points[chosen], points[cell]))
 
 
-def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
+def _cell_axes(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
     for axis, coordinate in cell.items():
         nearest(result, axis, coordinate, "--cell")  # refuses axes that there are not
     return {axis: float(cell.get(axis, points[0])) for axis, points in result.axes.items()}

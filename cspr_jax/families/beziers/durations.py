@@ -136,7 +136,7 @@ def least_duration(
 
 def _nearest(judgements: Verdicts) -> int:
     # Prefer durations that keep cables taut below the spools, then those that break the fewest limits by the least.
-    margin = np.nan_to_num(np.minimum(judgements.margin, judgements.room), nan=-np.inf)
+    margin = np.nan_to_num(np.minimum(judgements.margin, judgements.limit_margin), nan=-np.inf)
     counts = np.sum([(judgements.verdict & flag.value) > 0 for flag in Verdict], axis=0)
     return int(np.lexsort((-margin, counts, ~(judgements.margin > 0.0)))[0])
 

@@ -107,7 +107,7 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         motions.time,
         judgements.margin,
         judgements.bound,
-        judgements.room,
+        judgements.limit_margin,
         *(nothing, nothing, nothing),
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,

@@ -91,5 +91,5 @@ def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray,
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
     # Above the spools the margin of limits of tensions is not known, and the depth decides.
-    minimum = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
+    minimum = np.where(np.isneginf(judgements.limit_margin), margin, np.minimum(margin, judgements.limit_margin))
     return np.where(np.isnan(minimum), -np.inf, minimum)

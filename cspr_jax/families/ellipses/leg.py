@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.build.orientations import pose_quaternions
-from cspr_jax.build.scenes import scene_of
+from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.config.keys.ellipse import EllipseTable, Hertz
 from cspr_jax.config.keys.pose import Pose
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -82,14 +82,7 @@ class Ellipses(Leg):
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         waypoints = self.waypoints
-        scene = scene_of(
-            problem.robot,
-            waypoints.robot_file,
-            waypoints.frame,
-            waypoints.plan_file,
-            waypoints.path,
-            trajectory=waypoints.plan_file,
-        )
+        scene = scene_of_leg(problem.robot, waypoints)
         turnings = self._turnings(problem, z0, scene)
         transfers: list[Transfer] = []
         current = turnings[0]

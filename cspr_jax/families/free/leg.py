@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.build.orientations import pose_quaternions
-from cspr_jax.build.scenes import scene_of
+from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.families.free.closed_forms import ClosedForm, closed_forms
@@ -106,14 +106,7 @@ class FreeMotions(Leg):
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         waypoints = self.waypoints
-        scene = scene_of(
-            problem.robot,
-            waypoints.robot_file,
-            waypoints.frame,
-            waypoints.plan_file,
-            waypoints.path,
-            trajectory=waypoints.plan_file,
-        )
+        scene = scene_of_leg(problem.robot, waypoints)
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)

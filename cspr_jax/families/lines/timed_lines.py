@@ -70,7 +70,7 @@ def timed_lines(
         duration,
         judgements.margin,
         judgements.bound,
-        judgements.room,
+        judgements.limit_margin,
         *(nothing, nothing, nothing),
         np.where(moves, timings.ratio, 0.5) * duration,
         np.where(moves, timings.lower_bound, np.nan),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
 # decimals of places, m.
-JUMP, DIGITS, PLACES = 0.01, 4, 5
+JUMP, DIGITS, DECIMALS = 0.01, 4, 5
 # Criteria that are named at most for what binds.
 MOST_BINDING = 10
 # Flags of what a slower motion may mend.
@@ -167,7 +167,7 @@ def _limit(criterion: str, cable: int | None) -> str:
 
 
 def _coordinates(position: Iterable[float]) -> str:
-    return ", ".join(_shown(round(value, PLACES)) for value in position)
+    return ", ".join(_shown(round(value, DECIMALS)) for value in position)
 
 
 def _shown(value: float) -> str:

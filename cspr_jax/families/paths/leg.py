@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.scenes import scene_of
+from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.config.keys.path import GRID, RAMP_TIME, PathTable
 from cspr_jax.curves.files import BACK, kept_to, placed_inward, reference_of
 from cspr_jax.curves.spline import Spline, chained, part
@@ -86,14 +86,7 @@ class Paths(Leg):
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         waypoints = self.waypoints
-        scene = scene_of(
-            problem.robot,
-            waypoints.robot_file,
-            waypoints.frame,
-            waypoints.plan_file,
-            waypoints.path,
-            trajectory=waypoints.plan_file,
-        )
+        scene = scene_of_leg(problem.robot, waypoints)
         parts: list[list[Spline]] = [[] for _ in range(len(self))]
         through = np.empty(len(self), object)
         through[:] = [[] for _ in range(len(self))]

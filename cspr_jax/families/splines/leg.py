@@ -6,7 +6,7 @@ import numpy as np
 
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.scenes import scene_of
+from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.config.motions.table import MotionPieces, MotionTable, unit_hints
 from cspr_jax.curves.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.curves.interpolation import interpolated
@@ -58,14 +58,7 @@ class Splines(Leg):
         if self.waypoints.plan_file.stretch is not None:
             motions = [motion.stretched(self.waypoints.plan_file.stretch) for motion in motions]
         waypoints = self.waypoints
-        scene = scene_of(
-            problem.robot,
-            waypoints.robot_file,
-            waypoints.frame,
-            waypoints.plan_file,
-            waypoints.path,
-            trajectory=waypoints.plan_file,
-        )
+        scene = scene_of_leg(problem.robot, waypoints)
         return proved_answers(problem, motions, scene), list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:

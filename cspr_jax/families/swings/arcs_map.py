@@ -28,7 +28,7 @@ class MinimumArcsMap(PointMassMap):
         if robot_file.is_planar:
             raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
         super().__init__(robot_file, sweep_file, file)
-        self._scene = self._surroundings(robot_file)
+        self._scene = self._scene_or_none(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

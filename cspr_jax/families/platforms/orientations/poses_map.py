@@ -39,7 +39,7 @@ class PosesMap(PlatformMap):
         )
         from_rest = start is None or start.rest
         self._checker = pose_checker(self._problem, motion_kind(spec.trajectory, from_rest=from_rest), batch=MANY)
-        self._scene = self._surroundings(robot_file)
+        self._scene = self._scene_or_none(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
