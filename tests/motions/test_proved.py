@@ -141,3 +141,10 @@ def test_nothing_is_proved_of_a_motion_without_a_duration():
     motion = swings(problem, 5)[2][0]
     still = dataclasses.replace(motion, arcs=as_float64(np.nan))
     assert proof_of(problem, still).verdict == Verdict.UNDECIDED
+
+
+def test_a_motion_is_feasible_though_fewer_arcs_are_undecided():
+    problem = problem_of()
+    answers = proved_answers(problem, swings(problem, 5)[2][:3])
+    flags = np.array([0, Verdict.FEWER_ARCS_UNDECIDED.value, Verdict.UNDECIDED.value], answers.verdict.dtype)
+    assert dataclasses.replace(answers, verdict=flags).feasible.tolist() == [True, True, False]

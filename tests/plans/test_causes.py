@@ -272,6 +272,9 @@ def test_rest_at_an_end_names_all_limits_that_it_breaks_and_no_others():
     assert criteria["slack_cable"]["t"] == 0.0
     (above,) = cspr_jax.plan(both | {"pose": [LINE["pose"][0], {"position": [5.0, 3.0, 11.0]}]}).to_dict()["segments"]
     assert above["verdict"] == "slack_cable+above_spools+below_floor+cable_too_long"
+    # The spools come first; tensions, which have no bound at their plane, have no numbers.
+    assert [cause["criterion"] for cause in above["cause"]][::3] == ["above_spools", "slack_cable"]
+    assert above["cause"][0]["needed"] == pytest.approx(-1.0) and above["cause"][-1]["needed"] is None
 
 
 @pytest.mark.thorough
