@@ -20,6 +20,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 
@@ -47,6 +48,8 @@ class Peaks:
         acceleration_max: largest acceleration of a cable, m/s^2.
         mass_centre_speed: largest one, m/s.
         mass_centre_acceleration: likewise, m/s^2.
+        tension_margin: smallest distance of tensions from their limits, of redundant cables the largest that all can
+            keep, N.
         are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
         samples: number of instants at which the motion was sampled.
         when: when each of the extremes above is attained, (n, n_extremes), s.
@@ -63,6 +66,7 @@ class Peaks:
     acceleration_max: np.ndarray
     mass_centre_speed: np.ndarray
     mass_centre_acceleration: np.ndarray
+    tension_margin: np.ndarray
     are_found: np.ndarray
     samples: np.ndarray
     when: np.ndarray
@@ -70,7 +74,7 @@ class Peaks:
 
 
 # A largest value is the smallest value of the negative.
-_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
+_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 EXTREMES = [field.name for field in dataclasses.fields(Peaks)][: len(_SIGNS)]
 
 
@@ -89,8 +93,11 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
     if robot.n_cables > robot.dof:
         chosen = cables.shared(robot, state, limits, rule)
         force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
+        central = force if rule == CENTRED else cables.shared(robot, state, limits, CENTRED).tensions
     else:
-        force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
+        force = central = cables.tensions(robot, state)
+        are_found = jnp.asarray(1.0)
+    smallest, largest = tension_range(robot, limits)
     length, rate, rate_slope = cables.cable_motion(robot, state)
     of_cables = {
         "tension_min": force,
@@ -99,6 +106,7 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
         "length_max": -length,
         "speed_max": -jnp.abs(rate),
         "acceleration_max": -jnp.abs(rate_slope),
+        "tension_margin": jnp.minimum(central - smallest, largest - central),
     }
     extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
         "depth_min": plane_normal(robot) @ state.position,
@@ -121,6 +129,8 @@ def peaks(
     corners: Float[np.ndarray, "m 3"] | None = None,
 ) -> Peaks:
     """Extremes along motions, narrowed down between samples."""
+    # One compiled function serves whichever limits are given.
+    limits = Limits(*tension_range(robot, limits))
     table = np.empty((len(motions), 3, len(EXTREMES)))
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}

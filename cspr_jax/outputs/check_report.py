@@ -44,7 +44,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         **case.details,
         "tension_min": float(peaks.tension_min[0]),
         "tension_max": float(peaks.tension_max[0]),
-        "tension_margin": float(answers.margin[0]) if plan.is_redundant else None,
+        "tension_margin": float(plan.tension_margin[0]),
         **{row.name: float(getattr(peaks, row.peak)[0]) for row in LIMITS if row.peak},
         "z_lowest": float(peaks.lowest[0]),
         "demands": {CRITERIA[flag][0]: row for flag, row in _peaks(plan, case).items()},

@@ -280,6 +280,7 @@ def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
         "segment_verdict": answers.verdict,
         "segment_margin": answers.margin,
         "segment_margin_unit": [MARGIN_UNITS.index(plan.details(i)["margin_unit"]) for i in range(len(ends))],
+        "segment_tension_margin": plan.tension_margin,
         **cause_columns(plan.causes),
     }
     return {

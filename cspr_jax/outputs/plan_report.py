@@ -70,7 +70,7 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "limit_margin": float(answers.limit_margin[i]),
         "tolerated": float(answers.tolerated[i]),
         "not_tolerated": float(answers.not_tolerated[i]),
-        "tension_margin": _tension_margin(plan, i),
+        "tension_margin": float(plan.tension_margin[i]),
         "det_sign_constant": bool(peaks.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
         "cause": None if plan.is_feasible[i] else [cause.to_dict() for cause in plan.causes[i]],
@@ -82,17 +82,6 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
     }
     of_some = dict.fromkeys(name for name in SEGMENT if name not in (*fields, *_OF_DETAILS))
     return fields | of_some | plan.details(i)
-
-
-def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
-    # The margin of a swing on redundant cables is a multiple of the weight per cable; this one is in N.
-    robot = plan.problem.robot
-    unit = plan.details(i)["margin_unit"]
-    if not plan.is_redundant or unit == "m/s^2":
-        return None
-    if unit == "N":
-        return float(plan.answers.margin[i])
-    return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 
 
 def finite(value: Any) -> Any:
@@ -145,7 +134,6 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     proved = all(segment["margin_unit"] == "N" for segment in segments)
     retimed = all(segment["planned_duration"] is not None for segment in segments)
     columns = _times() if lines else _durations() if beziers else _counts(swings)
-    columns = _with_units(columns, list(dict.fromkeys(segment["margin_unit"] for segment in segments)))
     if proved:
         columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
     if any(segment["sections"] is not None or segment["objective"] is not None for segment in segments):
@@ -158,8 +146,6 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     columns |= {"v (m/s)": _of("speed_max", ".3f"), "a (m/s²)": _of("acceleration_max", ".3f")}
     if proved:
         return columns
-    if all(segment["tension_margin"] is not None for segment in segments):
-        columns["margin (N)"] = _of("tension_margin", ".1f")
     if lines:
         return columns | {"held back by": lambda segment: "; ".join(segment["active"])}
     if beziers:
@@ -176,20 +162,8 @@ def _times() -> dict[str, Column]:
         "acceleration (s)": _of("acceleration_time", ".4f"),
         "T (s)": _of("duration", ".4f"),
         "least (s)": _of("least_duration", ".4f"),
-        "margin": _two_digits("margin"),
+        "margin (N)": _two_digits("tension_margin"),
     }
-
-
-def _with_units(columns: dict[str, Column], units: list[str]) -> dict[str, Column]:
-    # The unit of margins stands above them, or beside each where segments have several.
-    margin = columns["margin"]
-    if len(units) == 1:
-        return {f"margin ({_written(units[0])})" if name == "margin" else name: row for name, row in columns.items()}
-    return columns | {"margin": lambda segment: f"{margin(segment)} {_written(segment['margin_unit'])}"}
-
-
-def _written(unit: str) -> str:
-    return unit.replace("^2", "²")
 
 
 def _durations() -> dict[str, Column]:
@@ -199,14 +173,14 @@ def _durations() -> dict[str, Column]:
         ]
         return ", ".join(f"{low} .. {high}" for low, high in ends) or "none"
 
-    return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _two_digits("margin")}
+    return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin (N)": _two_digits("tension_margin")}
 
 
 def _proved(counts: dict[str, Column]) -> dict[str, Column]:
     # Motions over pulleys have numbers of arcs, too.
     return dict(itertools.islice(counts.items(), 1)) | {
         "T (s)": _of("duration", ".4f"),
-        "margin (N)": _two_digits("margin"),
+        "margin (N)": _two_digits("tension_margin"),
         "proved (N)": _two_digits("margin_bound"),
     }
 
@@ -236,7 +210,7 @@ def _counts(swings: bool) -> dict[str, Column]:
         return str(segment[name] or f"- ({segment['tried_arcs'] // (2 if swings else 1)})")
 
     inclination = {"v": _of("inclination", ".4f")} if swings else {}
-    return {name: count} | inclination | {"T (s)": _of("duration", ".2f"), "margin": _of("margin", ".4f")}
+    return {name: count} | inclination | {"T (s)": _of("duration", ".2f"), "margin (N)": _two_digits("tension_margin")}
 
 
 def _of(name: str, form: str) -> Column:

@@ -24,7 +24,6 @@ from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame, frame_of
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.contacts.contact_bodies import shape_corners
-from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.store.reading.motion_samples import motion_windows
 from cspr_jax.verification.attained import attained
@@ -32,7 +31,7 @@ from cspr_jax.verification.proved_answers import MotionProof, answers_of, proof_
 from cspr_jax.verification.time_proof import TimeProof
 
 # Demands that are smallest values; the others are largest ones.
-SMALLEST = ("tension_min", "mu_min", "depth_min", "are_found")
+SMALLEST = ("tension_min", "mu_min", "depth_min", "tension_margin", "are_found")
 
 
 class _Window(NamedTuple):
@@ -80,8 +79,7 @@ def _windows(
 ) -> Iterator[_Window]:
     scene = scene_of(problem.robot, robot_file, frame, plan_file, path, trajectory=plan_file)
     corners = shape_corners(problem.robot, scene)
-    axes, limits = reference_of(build_robot(robot_file, plan_file, path)), problem.limits
-    limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
+    axes = reference_of(build_robot(robot_file, plan_file, path))
     tables = motion_windows(path)
     says: dict[str, Any] = {}
 
@@ -98,7 +96,7 @@ def _windows(
         centre = centre_from(robot_file, plan_file.point or says["point"])
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
-        extremes = peaks(problem.robot, [motion], [SAMPLES + 1], limits, plan_file.tension_rule, corners)
+        extremes = peaks(problem.robot, [motion], [SAMPLES + 1], problem.limits, plan_file.tension_rule, corners)
         proof = attained(problem, motion, proof_of(problem, motion, scene), scene)
         yield _Window(start, float(motion.duration()), proof, extremes, curve.interpolation, curve.ends)
 

@@ -25,7 +25,6 @@ from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import PlanLegs
-from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
@@ -115,6 +114,15 @@ class PlannedMotions:
     def is_redundant(self) -> bool:
         """Tell whether the robot has more cables than degrees of freedom."""
         return self.problem.robot.n_cables > self.problem.robot.dof
+
+    @cached_property
+    def tension_margin(self) -> np.ndarray:
+        """Smallest distance of tensions from their limits, (n,) N: as proofs have it, else between samples."""
+        margins = self.demands.tension_margin.copy()
+        for i, proof in enumerate(self.answers.proof):
+            if proof is not None and not proof.contacts_alone:
+                margins[i] = proof.margin
+        return np.where(np.isfinite(self.answers.duration), margins, np.nan)
 
     @property
     def outcome_columns(self) -> dict[str, np.ndarray]:
@@ -287,10 +295,7 @@ def _missed(plan_file: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> li
 def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], plan_file: PlanFile, corners: np.ndarray | None) -> Peaks:
     motions = [motion for leg in legs for motion in leg.motions]
     counts = np.concatenate([_counts(leg, plan_file) for leg in legs]).tolist()
-    # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
-    is_redundant = problem.robot.n_cables > problem.robot.dof
-    limits = problem.limits if is_redundant else NO_LIMITS
-    return peaks(problem.robot, motions, counts, limits, plan_file.tension_rule, corners)
+    return peaks(problem.robot, motions, counts, problem.limits, plan_file.tension_rule, corners)
 
 
 def _counts(leg: JoinedLeg, plan_file: PlanFile) -> np.ndarray:

@@ -64,7 +64,7 @@ SEGMENT = {
         "1",
         "Smallest multiple for which a robot was found that fails; null: none, or without uncertainty.",
     ),
-    "tension_margin": ("N", "Platforms on redundant cables: smallest distance of a tension from its limits."),
+    "tension_margin": ("N", "Smallest margin of tensions, as `segment_tension_margin` of a motion file."),
     "det_sign_constant": ("", "Whether the structure matrix keeps the sign of its determinant."),
     "verdict": ("", '"feasible", "undecided", or names of flags joined by "+" (verdicts, below).'),
     "cause": (
@@ -241,7 +241,7 @@ CHECK = {
     "failing_by_criterion": ("s", "Likewise, by the criterion that fails, the name of its flag."),
     "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
     "tension_max": ("N", "Largest tension of any cable, likewise."),
-    "tension_margin": ("N", "Redundant cables: `margin`; else null."),
+    "tension_margin": ("N", "`margin`."),
     **_EXTREMES,
     "demands": (
         "",

@@ -242,6 +242,12 @@ SEGMENTS = {
         Quantity(
             "segment_margin_unit", "1", "unit of the margin", "Unit of `segment_margin`: 0: 1, 1: N, 2: m/s^2.", "int16"
         ),
+        Quantity(
+            "segment_tension_margin",
+            "N",
+            "margin of tensions",
+            "Smallest distance of tensions from their limits; of redundant cables the largest that all can keep.",
+        ),
         Quantity("segment_cause", "1", "cause", "Verdict flag of the worst cause; 0: no cause.", "uint32"),
         Quantity(
             "segment_cause_cable",

@@ -10,7 +10,6 @@ import cspr_jax
 from cspr_jax.cli.command import print_table
 from cspr_jax.outputs import plan_report
 from cspr_jax.outputs.plots.pages.motions import motion_content
-from cspr_jax.outputs.plots.style.labels import margin_unit
 
 BASE = np.array([[0.0, 0.0, 4.0], [3.0, 0.0, 4.0], [1.5, 2.6, 4.0]])
 PLACES = np.array([[1.5, 0.8, 2.0], [1.6, 0.8, 2.1], [1.7, 0.8, 2.2]])
@@ -118,20 +117,15 @@ def heads(plan):
 
 
 @pytest.mark.thorough
-def test_margins_have_units(own):
-    """Of segments in the table and JSON, in motion files, and so in pictures and pages."""
+def test_margins_are_newtons(own):
+    """Of segments in the table and JSON, in motion files, and so in pages."""
     keys = {"schema": 1, "robot": str(own / "robot.toml"), "samples": 30}
     poses = [{"position": PLACES[0].tolist()}, {"position": PLACES[2].tolist()}]
     spline = {"family": "spline", "pose": [poses[0], poses[1] | {"time": 2.0}]}
     for family, unit in ((spline, "N"), ({"family": "quintic", "pose": poses}, "m/s^2")):
         plan = cspr_jax.plan(keys | family)
-        assert plan.to_dict()["segments"][0]["margin_unit"] == unit
-        shown = unit.replace("^2", "²")
-        assert any(f"margin ({shown})" in head for head in heads(plan))
+        (segment,) = plan.to_dict()["segments"]
+        assert segment["margin_unit"] == unit and "margin (N)" in heads(plan)
         result = plan.to_result()
-        assert margin_unit(result.data, 0) == shown
         content = motion_content("", result.axes | result.data, result.data, plan.robot_file, plan.keys)
-        assert content["segments"][0]["marginUnit"] == shown
-    both = [{"margin": 1.0, "margin_unit": unit} for unit in ("N", "1")]
-    column = plan_report._with_units({"margin": lambda segment: f"{segment['margin']:g}"}, ["N", "1"])["margin"]
-    assert [column(segment) for segment in both] == ["1 N", "1 1"]
+        assert content["segments"][0]["margin"] == segment["tension_margin"] == plan.tension_margin[0]

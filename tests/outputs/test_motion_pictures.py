@@ -99,7 +99,7 @@ def test_a_plan_on_a_page(motions, figures, capsys):
     cells = {place: cell.get_text().get_text() for place, cell in table.get_celld().items()}
     for k in range(2):
         assert [cells[k + 1, j] for j in (0, 1, 4)] == [f"{k + 1}", f"{result.data['segment_arcs'][k]}", "feasible"]
-        assert float(cells[k + 1, 3]) == pytest.approx(result.data["segment_margin"][k], rel=1e-3)
+        assert float(cells[k + 1, 3]) == pytest.approx(result.data["segment_tension_margin"][k], rel=1e-3)
     rates = next(panel for panel in figure.axes if panel.get_ylabel() == "cable speed (m/s)")
     np.testing.assert_array_equal(rates.lines[1].get_ydata(), result.data["rate"][:, 1])
 

@@ -15,7 +15,7 @@ from cspr_jax.outputs.plots.motions.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.motions.trajectory import draw_trajectory, legend_of, points_in_space
 from cspr_jax.outputs.plots.robots.robot_along import limits_of
 from cspr_jax.outputs.plots.style.fitting import legend_above
-from cspr_jax.outputs.plots.style.labels import cable_names, line_look, margin_unit, robot_name
+from cspr_jax.outputs.plots.style.labels import cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
 from cspr_jax.outputs.plots.style.scene import shape_of
 from cspr_jax.outputs.plots.style.word_ticks import reasons
@@ -27,7 +27,7 @@ SEGMENTS = 8
 # Inches: height of a line of the table, on a page and in a column; width of the robot, and its heights.
 LINE, NARROW_LINE = 0.28, 0.44
 ACROSS, LOW, HIGH = 6.6, 3.0, 6.4
-HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
+HEADS = ("segment", "arcs", "duration (s)", "margin (N)", "verdict")
 # Fractions of the width, and letters of a line of the verdict: of a page, and of a column.
 WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)
 
@@ -92,17 +92,14 @@ def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None
 def _cells(result: Result) -> list[list[str]]:
     data = result.data
     count = len(data.get("segment_end", ()))
-    cells = []
+    cells, margins = [], data.get("segment_tension_margin", np.full(count, np.nan))  # earlier versions stored none
     for k in range(min(count, SEGMENTS)):
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
-        margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
+        margin = f"{margins[k]:.4g}" if np.isfinite(margins[k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
         # Lines, Bezier segments and splines have no arcs; a swing that is not feasible has no feasible number.
         arcs_text = f"{arcs}" if arcs else "none" if data["segment_tried_arcs"][k] else "-"
-        unit = margin_unit(data, k) if margin != "none" else ""
-        cells.append(
-            [number, arcs_text, f"{duration:.4g}", f"{margin} {unit}".strip(), _verdict(data["segment_verdict"][k])]
-        )
+        cells.append([number, arcs_text, f"{duration:.4g}", margin, _verdict(data["segment_verdict"][k])])
     return cells
 
 

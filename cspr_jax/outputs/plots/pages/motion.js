@@ -225,9 +225,9 @@ const charts = () => OVER_TIME.filter(([, name]) => motion.own[name]);
 function tellSegments() {
   const { own } = motion, time = own.t[motion.row];
   const rows = own.segments.map((part, k) => [k + 1, `${shown(part.start, 4)} – ${shown(part.end, 4)} s`,
-    part.arcs || "–", part.margin === null ? "–" : `${shown(part.margin, 4)} ${part.marginUnit}`.trim(),
+    part.arcs || "–", part.margin === null ? "–" : shown(part.margin, 4),
     part.isFeasible ? "feasible" : part.verdict]);
-  if (rows.length) rowsInto(element("segments"), rows, ["segment", "time", "arcs", "margin", "verdict"]);
+  if (rows.length) rowsInto(element("segments"), rows, ["segment", "time", "arcs", "margin (N)", "verdict"]);
   const now = own.segments.findIndex((part) => time <= part.end);
   if (own.segments.length > 1 && now >= 0) element("segments").rows[now + 1].className = "now";
 }

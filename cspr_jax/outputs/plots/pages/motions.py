@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.robots.obstacles import lines_on, points_of
 from cspr_jax.outputs.plots.robots.robot_along import limits_of, moving
 from cspr_jax.outputs.plots.robots.robot_at import hull_of
 from cspr_jax.outputs.plots.style.fitting import shortened
-from cspr_jax.outputs.plots.style.labels import WRITTEN, cable_names, margin_unit
+from cspr_jax.outputs.plots.style.labels import WRITTEN, cable_names
 from cspr_jax.outputs.plots.style.word_ticks import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.segment_causes import cause_text
 from cspr_jax.robots.model.shapes import Obstacle
@@ -166,7 +166,7 @@ def _chosen(time: np.ndarray) -> np.ndarray:
 
 
 def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
-    rows = []
+    rows, margins = [], segments.get("segment_tension_margin")  # files of earlier versions have none
     for i, end in enumerate(np.asarray(segments.get("segment_end", ())).tolist()):
         code = int(segments["segment_verdict"][i])
         words = Verdict(code).text.replace("_", " ").replace("+", ", ")
@@ -176,8 +176,7 @@ def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
                 "start": float(segments["segment_start"][i]),
                 "end": end,
                 "arcs": int(segments["segment_tried_arcs"][i]),
-                "margin": _number(segments["segment_margin"][i]),
-                "marginUnit": margin_unit(segments, i),
+                "margin": None if margins is None else _number(margins[i]),
                 "isFeasible": int(segments["segment_arcs"][i]) > 0 or code == 0,
                 "verdict": ": ".join(filter(None, (words, cause_text(segments, i)))),
                 "colour": colour,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.outputs.plots.style.fitting import shortened
-from cspr_jax.schema.quantities import MARGIN_UNITS
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
@@ -47,13 +46,6 @@ def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
     """Names of the columns of a motion's tensions."""
     word = "pair" if "tension_each" in columns else "cable"
     return [f"{word} {k + 1}" for k in range(columns["tension"].shape[1])]
-
-
-def margin_unit(segments: Mapping[str, np.ndarray], i: int) -> str:
-    """Unit of the margin of a segment as pictures show it."""
-    codes = segments.get("segment_margin_unit", ())
-    unit = MARGIN_UNITS[int(codes[i])] if len(codes) and 0 <= codes[i] < len(MARGIN_UNITS) else "1"
-    return "" if unit == "1" else unit.replace("^2", "²")
 
 
 def robot_name(result: Result) -> str:
