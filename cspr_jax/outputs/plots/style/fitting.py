@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from matplotlib.axes import Axes
+from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
@@ -83,22 +84,30 @@ def _is_panel(panel: Axes) -> bool:
 
 def thin_ticks(figure: Figure) -> None:
     """Give horizontal axes of numbers fewer ticks where these would meet."""
-    for panel in figure.axes:
-        is_plane = panel.get_visible() and panel.name == "rectilinear"
-        if not is_plane or not isinstance(panel.xaxis.get_major_locator(), MaxNLocator):
-            continue
-        for count in FEWER_TICKS:
-            with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "constrained_layout not applied")
-                figure.draw_without_rendering()
-            low, high = sorted(panel.get_xlim())
-            ticks = [tick for tick in panel.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
-            boxes = [tick.label1.get_window_extent().padded(1.0) for tick in ticks if tick.label1.get_visible()]
-            if not any(one.overlaps(other) for one, other in itertools.pairwise(boxes)):
-                break
+    panels = [panel for panel in figure.axes if panel.get_visible() and panel.name == "rectilinear"]
+    panels = [panel for panel in panels if isinstance(panel.xaxis.get_major_locator(), MaxNLocator)]
+    for count in FEWER_TICKS:
+        if not panels:
+            return
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "constrained_layout not applied")
+            figure.draw_without_rendering()
+        drawn = {panel: _ticks(panel) for panel in panels}
+        panels = [panel for panel, ticks in drawn.items() if _labels_meet(ticks)]
+        for panel in panels:
             # Two numbers show a scale: at last the outer ones stay.
-            ends = FixedLocator([ticks[0].get_loc(), ticks[-1].get_loc()])
+            ends = FixedLocator([drawn[panel][0].get_loc(), drawn[panel][-1].get_loc()])
             panel.xaxis.set_major_locator(MaxNLocator(count) if count > 1 else ends)
+
+
+def _ticks(panel: Axes) -> list[Tick]:
+    low, high = sorted(panel.get_xlim())
+    return [tick for tick in panel.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+
+
+def _labels_meet(ticks: list[Tick]) -> bool:
+    boxes = [tick.label1.get_window_extent().padded(1.0) for tick in ticks if tick.label1.get_visible()]
+    return any(one.overlaps(other) for one, other in itertools.pairwise(boxes))
 
 
 def _fit_title(figure: Figure, space: float, *, has_title: bool, lines: int | None) -> None:
