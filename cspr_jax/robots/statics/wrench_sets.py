@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration
 from cspr_jax.robots.model.robot import Robot
@@ -223,10 +224,10 @@ def acceleration_faces(
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 
 
-@jax.jit
 def tension_range(robot: Robot, limits: Limits) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]]:
-    """Smallest and largest tension of each cable."""
-    count = robot.n_cables
-    low = jnp.zeros(count) if limits.tension_min is None else jnp.asarray(limits.tension_min)
-    high = jnp.full(count, jnp.inf) if limits.tension_max is None else jnp.asarray(limits.tension_max)
-    return jnp.broadcast_to(low, (count,)), jnp.broadcast_to(high, (count,))
+    """Smallest and largest tension of each cable; NumPy arrays where nothing is traced."""
+    is_traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((robot, limits)))
+    xp = jnp if is_traced else np
+    low = as_float64(0.0 if limits.tension_min is None else limits.tension_min)
+    high = as_float64(np.inf if limits.tension_max is None else limits.tension_max)
+    return xp.broadcast_to(low, (robot.n_cables,)), xp.broadcast_to(high, (robot.n_cables,))
