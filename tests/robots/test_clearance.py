@@ -130,6 +130,7 @@ def test_hulls(count=2_000):
     assert (len(block.edges), len(block.normals)) == (12, 12)
     odd = shapes.hull(rng.normal(size=(9, 3)))
     a, u, _ = random_boxes(count, 5)
+    boxes = BOX(a, u, np.tile(half, (count, 1)))
     for solid in (block, odd):
         found = lanes(lambda a, u, s=solid: clearance_lanes.segment_hull(a, u, tables(s)))(a, u)
         far = oracle.outside_triangles(a, u, solid.triangles).astype(float)
@@ -141,9 +142,8 @@ def test_hulls(count=2_000):
         is_in = depth < -0.02
         assert is_in.sum() > 100
         assert (found[is_in] >= depth[is_in] - 1e-2).all() and (found[is_in] <= 0.5 * depth[is_in] + 1e-9).all()
-    boxes = BOX(a, u, np.tile(half, (count, 1)))
-    found = lanes(lambda a, u: clearance_lanes.segment_hull(a, u, tables(block)))(a, u)
-    np.testing.assert_allclose(np.maximum(found, 0), np.maximum(boxes, 0), rtol=0, atol=EXACT)
+        if solid is block:
+            np.testing.assert_allclose(np.maximum(found, 0), np.maximum(boxes, 0), rtol=0, atol=EXACT)
 
 
 @settings(max_examples=100)
@@ -470,17 +470,22 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "old", "new"), FAULTS)
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [pytest.param(*one, marks=() if k % 2 else pytest.mark.thorough) for k, one in enumerate(FAULTS)],
+)
 def test_a_planted_sign_is_found(monkeypatch, name, old, new):
     source = inspect.getsource(getattr(clearance_lanes, name))
     assert source.count(old) == 1
     room = dict(vars(clearance_lanes))
     exec("from __future__ import annotations\n" + source.replace(old, new), room)
     monkeypatch.setattr(clearance_lanes, name, room[name])
+    if name == "segments":
+        pairs = random_segments(4_000, 9)
+        assert np.abs(lanes(clearance_lanes.segments)(*pairs) - oracle.segments(*pairs)).max() > 1e-3
+        return
     a, u, half = random_boxes(4_000, 9)
     boxes = lanes(clearance_lanes.segment_box)(a, u, half)
-    pairs = random_segments(4_000, 9)
     wrong = np.abs(np.maximum(boxes, 0.0) - oracle.outside_box(a, u, half)).max()
-    wrong = max(wrong, np.abs(lanes(clearance_lanes.segments)(*pairs) - oracle.segments(*pairs)).max())
     part = oracle.chord(a, u, half)
     assert wrong > 1e-3 or (boxes[part > 1e-6] >= 0.0).any() or (boxes[part < -1e-6] < 0.0).any()

@@ -213,19 +213,23 @@ def test_cables_are_as_thick_as_both_of_their_radii():
 
 def test_determinants_over_blocks():
     rng = np.random.default_rng(5)
+
+    @jax.jit
+    def found(bands):
+        value = jax.vmap(determinant)(bands)
+        return value, magnitude_range(value), changes_sign(value)
+
     for n in (1, 2, 6):
         middle, slope = rng.normal(size=(2, 40, n, n))
         bands = AffineBounds(middle, 0.01 * slope, np.full(middle.shape, 1e-5))
-        value = jax.tree.map(np.asarray, jax.jit(jax.vmap(determinant))(bands))
+        value, (low, high), does = jax.tree.map(np.asarray, found(bands))
         noise = 1e-5 * rng.uniform(-1.0, 1.0, (len(S), *middle.shape))
         exact = np.linalg.det(middle + 0.01 * S[:, None, None, None] * slope + noise)
         over = np.abs(exact - value.middle - value.linear * S[:, None]) - value.radius
         assert not (over > 1e-12 * np.abs(exact).max()).any()
-        low, high = magnitude_range(value)
         assert (low <= np.abs(exact).min(0)).all() and (high >= np.abs(exact).max(0)).all()
         closed = np.nanmedian(value.radius / np.abs(value.middle))
         assert closed < 0.05
-        does = np.asarray(changes_sign(value))
         assert ((exact[0] * exact[-1] < 0.0) | ~does).all()
 
 
@@ -233,6 +237,6 @@ def test_corners_of_a_platform():
     """Depths of the corners of a box that hangs level, and of one that is tilted."""
     robot, around = surrounded("cogiro", shapes.box([0.0, 0.0, 0.2], [0.4, 0.4, 0.4]), 0.0)
     body = bodies_of(robot, around).body
-    depths = corner_depths(body.corners, lifted(0.05, height=2.0))
+    depths = jax.tree.map(np.asarray, jax.jit(corner_depths)(body.corners, lifted(0.05, height=2.0)))
     np.testing.assert_allclose(depths.linear, 0.05 * body.corners[:, 1], atol=1e-15)
     assert float(depths.middle.max()) == pytest.approx(2.4) and float(depths.high().max()) > 2.4 + 0.05 * 0.2

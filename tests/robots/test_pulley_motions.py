@@ -1,6 +1,7 @@
 """Cables behind pulleys in motion: lengths, rates and tensions against a root finder, and their bounds over blocks."""
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -90,16 +91,19 @@ def test_pulleys_of_no_size_are_none():
     """In values and derivatives, also where cables run along their axes; other pulleys do not change these cables."""
     bare, rng = made("3T", 3), np.random.default_rng(1)
     above = np.asarray(bare.base_points) + np.array([[0.0, 0.0, 1.3], [0.0, 0.0, -0.7], [0.3, 0.2, 1.0]])
+    points = wheels(radius=[0.0, 0.0, 0.1])
+
+    @jax.jit
+    @partial(jax.grad, argnums=(0, 1))
+    def derivatives(targets, robot, moving):
+        return sum(jnp.sum(values[:2]) for values in moved_lengths(robot, targets, *moving))
+
     for targets in (above, rng.normal(size=(3, 3)) + np.array([0.0, 0.0, 2.0])):
         moving = rng.normal(size=(2, 3, 3))
-        points = wheels(radius=[0.0, 0.0, 0.1])
-
-        def total(targets, robot, moving=moving):
-            return sum(jnp.sum(values[:2]) for values in moved_lengths(robot, targets, *moving))
-
-        for one, other in zip(MOVED(points, targets, *moving), MOVED(bare, targets, *moving), strict=True):
+        pairs = (map(np.asarray, MOVED(robot, targets, *moving)) for robot in (points, bare))
+        for one, other in zip(*pairs, strict=True):
             np.testing.assert_allclose(one[:2], other[:2], rtol=1e-14)
-        slopes = [jax.jit(jax.grad(total, argnums=(0, 1)))(jnp.asarray(targets), robot) for robot in (points, bare)]
+        slopes = [jax.tree.map(np.asarray, derivatives(targets, robot, moving)) for robot in (points, bare)]
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes[0]))
         np.testing.assert_allclose(slopes[0][0][:2], slopes[1][0][:2], atol=1e-12)
     at = state_of("3T", rng)
@@ -120,8 +124,7 @@ def test_tensions_balance_any_pattern(pattern):
     """On as many cables as degrees of freedom, behind pulleys; their derivatives are finite."""
     robot = wheels(pattern, PATTERNS[pattern].dof)
     at = state_of(pattern, np.random.default_rng(7))
-    force = TENSIONS(robot, at)
-    matrix, wrench = (np.asarray(f(robot, at)) for f in (MATRIX, INERTIAL))
+    force, matrix, wrench = (np.asarray(f(robot, at)) for f in (TENSIONS, MATRIX, INERTIAL))
     np.testing.assert_allclose(matrix @ force, wrench, atol=1e-9 * np.abs(wrench).max())
     slopes = jax.jit(jax.grad(lambda robot, at: jnp.sum(cables.tensions(robot, at))))(robot, at)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))

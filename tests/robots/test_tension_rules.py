@@ -96,7 +96,8 @@ def test_what_closed_forms_miss():
 @pytest.mark.parametrize(
     ("exponent", "dof"),
     [
-        *((exponent, 2) for exponent in (1.5, 2.0, 4.0, 12.0)),
+        *((exponent, 2) for exponent in (1.5, 4.0)),
+        *(pytest.param(exponent, 2, marks=pytest.mark.thorough) for exponent in (2.0, 12.0)),
         *(pytest.param(exponent, 6, marks=pytest.mark.thorough) for exponent in (1.5, 2.0, 4.0, 12.0)),
     ],
 )
@@ -192,11 +193,11 @@ def test_lanes_find_the_same(dof, count):
 
 
 def test_lanes_leave_singular_poses_open():
-    matrices, wrenches = poses(6, 8, seed=9)
-    matrices[3, 5] = matrices[3, 4]
-    matrices[4, 5] = matrices[4, 4] + 1e-9 * matrices[4, 5]
+    matrices, wrenches = poses(2, 4, seed=9)
+    matrices[3, 1] = matrices[3, 0]
+    matrices[4, 1] = matrices[4, 0] + 1e-9 * matrices[4, 1]
     matrices[5] = np.nan
-    _, is_open = least_norms(matrices, wrenches, *np.broadcast_to([[[LOW]], [[HIGH]]], (2, COUNT, 8)))
+    _, is_open = least_norms(matrices, wrenches, *np.broadcast_to([[[LOW]], [[HIGH]]], (2, COUNT, 4)))
     assert np.flatnonzero(is_open).tolist() == [3, 4, 5]
     assert not distributions(matrices, wrenches, LOW, HIGH).is_within[[3, 5]].any()
 
