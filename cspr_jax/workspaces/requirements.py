@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.given_numbers import numbers
-from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -68,7 +68,9 @@ def _weight(robot: AnyRobot) -> RequiredWrenches:
     # Return the wrench that holds the robot still; that of a body on a joint depends on the orientation.
     if PATTERNS[robot.pattern].is_jointed:
         return RequiredWrenches(None)
-    return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), np.array([IDENTITY]))))
+    wrench = np.zeros((1, robot.dof))
+    wrench[0, PATTERNS[robot.pattern].forces.index(2)] = -float(robot.mass * robot.gravity)
+    return RequiredWrenches(wrench)
 
 
 def required_wrenches(

@@ -355,6 +355,7 @@ def test_whole_cells_of_speeds(tmp_path):
     assert set(np.unique(side)) == {0, 1, 2}
 
 
+@pytest.mark.quick("2R3T", "pulleys")
 @pytest.mark.parametrize("pattern", ["1T", "2R3T", "3R", "pulleys"])
 def test_no_velocity_needs_a_faster_cable(pattern):
     """Finite differences of the lengths along many velocities: none is faster, and the fastest nearly are."""

@@ -46,7 +46,7 @@ def poses_of(drawn, rng, count):
     return np.array([place for place, _ in drawn_poses]), np.array([turn for _, turn in drawn_poses])
 
 
-@pytest.mark.quick("2T-3-0.1", "3T-4-0.1", "3R3T-8-0.1")
+@pytest.mark.quick("3T-4-0.1", "3R3T-8-0.1")
 @pytest.mark.parametrize("fraction", [pytest.param(SHARES[0], marks=pytest.mark.thorough), *SHARES[1:]])
 @pytest.mark.parametrize(("pattern", "n"), [*SIZES, *(pytest.param(*size, marks=pytest.mark.soak) for size in MORE)])
 def test_identities_of_the_margin(pattern, n, fraction):

@@ -21,6 +21,7 @@ G = cable_robots.GRAVITY
 CORNERS = np.array([[x, y, z] for x in (-2.0, 2.0) for y in (-1.5, 1.5) for z in (0.5, 3.0)])
 
 
+@pytest.mark.quick("7-5-float64", "7-5-float32")
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 @pytest.mark.parametrize(("count", "together"), [(6, 4), (7, 5), (8, 6)])
 def test_cables_that_never_span_all_components(count, together, precision):
@@ -92,6 +93,7 @@ def test_forces_of_a_rod_have_the_axes_of_the_file():
     np.testing.assert_allclose(weight.points, required_wrenches(own, frame).points)
 
 
+@pytest.mark.quick("float64")
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_any_length_may_be_the_unit_of_moments(precision):
     """Verdicts do not depend on it; the capacity margin is the distance from the facets in that unit."""
