@@ -226,7 +226,7 @@ def acceleration_faces(
 
 def tension_range(robot: Robot, limits: Limits) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]]:
     """Smallest and largest tension of each cable; NumPy arrays where nothing is traced."""
-    is_traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((robot, limits)))
+    is_traced = any(isinstance(array, jax.core.Tracer) for array in jax.tree.leaves((robot, limits)))
     xp = jnp if is_traced else np
     low = as_float64(0.0 if limits.tension_min is None else limits.tension_min)
     high = as_float64(np.inf if limits.tension_max is None else limits.tension_max)
