@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +12,8 @@ from cspr_jax.families.ellipses import harmonics
 from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import SpoolHull, hull_of
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.kernel_axes import centred
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 COUNT = 1 << 20
 

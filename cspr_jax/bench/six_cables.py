@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,12 +23,10 @@ from cspr_jax.motion import amplitudes
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.batches import device_batch_size, in_batches, in_threads, padded
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.reference_pose import aligned
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128

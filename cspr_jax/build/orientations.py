@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import UNIT_NORM
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def orientations(

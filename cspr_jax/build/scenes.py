@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene, scene
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -21,9 +21,6 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.shapes import Body, Obstacle, in_kernel_axes, inward, rotated
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.robots.statics.reference_pose import aligned
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def robot_scene(

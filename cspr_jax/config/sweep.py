@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
@@ -16,12 +16,10 @@ from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, Tr
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, name_of
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 LARGEST_COUNT = 10_000_000
 

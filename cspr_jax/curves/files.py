@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
@@ -18,14 +18,12 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.robots.statics.reference_pose import aligned
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 MANY = 30  # samples, at least, of a motion that is no sequence of waypoints
 MOVING = 0.2  # part of the largest speed that counts as moving

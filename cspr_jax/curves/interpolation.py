@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
@@ -18,9 +18,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
 from cspr_jax.numerics.elementary import as_float64
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.curves.interpolation import continuous
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 WINDOW = 96  # samples in which noise is estimated at a time
 MAX_WINDOWS = 16

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,13 +17,11 @@ from cspr_jax.numerics.bounds.piecewise_bounds import overlaps, piecewise_bounds
 from cspr_jax.numerics.bounds.rotation_bounds import rotation_bounds
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,9 +11,7 @@ import numpy as np
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.numerics.linear.frames import Frame
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # A point of release counts as on a parabola that it misses by less than this part of its distance from the target.
 ON_PARABOLA = 1e-6

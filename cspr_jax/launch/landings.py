@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,12 +23,10 @@ from cspr_jax.launch.flight import flown
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.force_balance import cable_motion
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 1024
 NEWTON_STEPS = 12

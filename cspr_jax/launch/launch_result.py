@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,10 +14,8 @@ from cspr_jax.launch.flight import flown
 from cspr_jax.launch.landings import LaunchErrors, Scatter, Throw, scatter, state_at
 from cspr_jax.motion.leg import LegResult
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 FLIGHT_ROWS = 101
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,14 +15,12 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # How far a refined margin may lie below the bound proved for it.
 CHECK_ERROR = 1e-8

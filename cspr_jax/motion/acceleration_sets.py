@@ -7,21 +7,19 @@ the tensions at rest also keep their limits, to the wrench-closure workspace if 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.numerics.tolerances import BOUNDARY
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar, plane_normal
 from cspr_jax.robots.statics.wrench_sets import Faces, acceleration_faces, tension_range
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Components of unit normals below this count as zero.
 LEVEL = 1e-12

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -19,10 +18,8 @@ from jax import Array
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.numerics.elementary import as_float64, polynomial
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")

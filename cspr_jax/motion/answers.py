@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from cspr_jax.motion.cause import UNITS, Cause
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Bool, Int
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, NO_REASON, Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Int
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
 # Feasible motions may have this flag.

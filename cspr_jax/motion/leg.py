@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import jax
 import numpy as np
@@ -15,9 +15,7 @@ from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
@@ -18,9 +19,6 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def limits_set(limits: Limits) -> tuple[Limit, ...]:

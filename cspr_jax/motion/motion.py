@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -18,14 +18,12 @@ from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds import state_bounds
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model import state as states
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # States that are computed at once.
 STATES = 64

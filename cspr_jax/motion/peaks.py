@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ from cspr_jax.motion.limits import lowest_depth
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.minima import narrowed_times
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import plane_normal
@@ -23,9 +24,6 @@ from cspr_jax.robots.model.tension_rule_table import CENTRED
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 SAMPLES = 64  # of an arc, at least
 BATCH = 512  # samples computed at a time

@@ -12,8 +12,6 @@ order, with n the number of cables, kappa_k the tension of cable k over its leng
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -21,6 +19,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set, scales, slack, values
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -28,9 +27,6 @@ from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, rest_
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def slacks(problem: Problem, motion: Motion, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:

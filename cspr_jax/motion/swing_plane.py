@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.elementary import length
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.model.point_mass import AT_P0
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # Sine of an angle below which a plane counts as upright.
 UPRIGHT = 1e-12

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from cspr_jax.config.keys.pose import Pose
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.families import FAMILIES
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,15 +6,14 @@ import contextlib
 import math
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Numbers of terms that keep the truncation error below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}

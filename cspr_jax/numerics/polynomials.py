@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 def product(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> np.ndarray:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cspr_jax.motion.limits import other_limits
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.criteria import judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def binding(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +17,9 @@ from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.plans.verified_legs import verified
 from cspr_jax.schema.families import FAMILIES, moving
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 POINT_MASS = "3T"
 

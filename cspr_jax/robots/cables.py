@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jax import Array
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Axes, Diameter, Radii
 from cspr_jax.numerics.elementary import as_float64, solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -26,9 +27,6 @@ from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import Distribution
 from cspr_jax.robots.tensions.tension_rules import by_rule
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
 RobotKind = TypeVar("RobotKind", bound=AnyRobot)

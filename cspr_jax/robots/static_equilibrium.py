@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.wrench_balance import at_rest
 from cspr_jax.robots.tensions.tension_programs import by_program
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Depths that are tried, over the mean distance of the spools from their centroid.
 DEPTHS = np.linspace(-0.95, 1.0, 40)

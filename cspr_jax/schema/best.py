@@ -8,17 +8,15 @@ equals, the one with the largest margin.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.meanings import CELL_SIDES
 from cspr_jax.schema.quantities import AXES, BEST, QUANTITIES, best_name
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.
 FIRST = ("arcs", "oscillations", "release_speed", "margin")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, speed_slacks
 from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.time_proof import TimeProof, time_proof
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, TimeProof]:

@@ -11,14 +11,12 @@ reason, together with the limits that every number of arcs breaks.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Bool, Int, Num
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Int, Num
 
 
 class Refused(NamedTuple):

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.motion.motion import BoundedMotion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.bounds.block_slacks import BATCH, block_slacks
 from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, radii_of
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Half the length of short blocks over the usual one.
 SHORT = 1e-6

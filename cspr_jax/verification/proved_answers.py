@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds, at_rest
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -24,9 +25,6 @@ from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria, levels
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Intervals between instants of a motion that is only sampled.
 SAMPLES = 2000

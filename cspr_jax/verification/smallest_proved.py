@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 # Takes the motions to try, (m,) indices, and the smallest number to try of each. Returns the number that was tried of
 # each, not below that, or `NONE` where there is none, and the verdict.

@@ -11,15 +11,12 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.verification.bounds.block_parts import TimeBlocks, joined
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
 FIRST = 32

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
-
-if TYPE_CHECKING:
-    from jaxtyping import Num
 
 # Gives answers and motions of some segments, by their numbers, with numbers of arcs: those of `Waypoints.arcs`.
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]

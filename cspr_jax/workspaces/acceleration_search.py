@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -11,12 +10,10 @@ import numpy as np
 from cspr_jax.motion.acceleration_sets import AccelerationRanges, acceleration_ranges_at, faces_at, verdict
 from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.wrench_sets import Faces
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Number of positions computed at a time; fewer for robots on many cables, whose faces are many.
 BATCH = 4096

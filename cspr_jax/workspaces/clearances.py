@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import unit_vectors
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Clearances, Kind, Scene, clearances
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces.poses import geometry
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 BATCH = 4096
 # Step of differences, over the size of the robot.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -18,6 +18,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches, in_parts
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import BOUNDARY, FORMULAS_UNDECIDED, TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -28,9 +29,6 @@ from cspr_jax.workspaces.poses import exact, facet_normals, geometry, kernels
 from cspr_jax.workspaces.poses.margins import Wrenches
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 from cspr_jax.workspaces.requirements import CLOSURE, Requirement
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Bounds of a margin in single precision may differ by this part of the largest limit.
 SINGLE_ERROR = 1e-3

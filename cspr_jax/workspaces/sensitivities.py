@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -13,15 +12,13 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.linear.rotations import matrix
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.statics.reference_pose import aligned
 from cspr_jax.robots.statics.sensitivities import Sensitivities, pair_sensitivities, sensitivities
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 8192  # positions at a time
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.meanings import OPEN_CONDITIONS
 from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict
@@ -22,9 +22,6 @@ from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.static_poses import RestPoses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # How often open cells are halved along each axis.
 DEPTH = 2

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
@@ -23,9 +24,6 @@ from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import numpy as np
@@ -18,15 +18,13 @@ from cspr_jax.motion.given_limits import limits_over
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.model.robot import check_determined, check_moved
 from cspr_jax.robots.statics.kernel_axes import prepared
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def check_point_mass(robot: Any) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -20,9 +19,7 @@ from cspr_jax.config.reading import other_case
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import did_you_mean
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cspr_jax.errors import ConfigError
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.spool_plane import SMALLEST_AREA_RATIO
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Rows: x, y and z of a robot file in the axes of another, for each plane, or line, of motion there.
 SAME = np.eye(3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -13,9 +13,7 @@ from cspr_jax.config.keys.trajectory import Angle
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors.given_numbers import SMALLEST
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 class Hertz(Table):

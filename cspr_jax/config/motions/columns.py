@@ -10,7 +10,6 @@ import dataclasses
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,10 +32,8 @@ from cspr_jax.config.motions.table import POINTS, Z_AXES
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import did_you_mean, nearest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.quantities import TRAJECTORY
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Columns that this program writes beside the motion.
 _BESIDE = re.compile(rf"(?:{'|'.join(sorted(TRAJECTORY.keys() - WRITTEN.keys() - {'t'}))})(?:_\w+)?|feasible")

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import re
 from decimal import ROUND_FLOOR, Decimal
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.config.motions.heads import TIMES
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Whole stamps without a unit that are times between these, s since 1970, have digits enough to tell their unit.
 EPOCH = (3e8, 5e9)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.config.wording import either
 from cspr_jax.errors import InputError
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Vectors between a file with z up and one with z down, by half a turn about x; see `numerics.linear.frames`.
 _FLIP = np.array([1.0, -1.0, -1.0])

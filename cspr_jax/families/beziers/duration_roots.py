@@ -8,15 +8,13 @@ most, is zero.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.families.beziers.motion import powers
 from cspr_jax.numerics.polynomials import product, total
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 class Ends(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -18,13 +17,11 @@ from cspr_jax.families.beziers.verdicts import BATCH, verdicts_within
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.robots.statics.force_balance import adjugate
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Halvings of the interval between a duration that is feasible and one that is not: as many as float64 has digits.
 HALVINGS = 60

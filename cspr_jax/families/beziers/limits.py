@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import numpy as np
@@ -20,10 +20,8 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.interval_jets import Jet, lowest
 from cspr_jax.numerics.polynomials import bounds, derivatives, over, product, total
 from cspr_jax.numerics.search.block_minima import MinimumBlocks, Proved, smallest
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.statics.force_balance import adjugate
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 Items = dict[str, Any]
 # Blocks that are computed together.

@@ -8,7 +8,7 @@ a quadratic. All this holds for a point mass on two cables in a plane likewise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,11 +16,9 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.families.beziers.motion import Bezier, powers
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, rest_point, spool_radius
 from cspr_jax.robots.statics.force_balance import adjugate, pseudotensions
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Rounding errors are below so many units of the sum of the magnitudes of all terms.
 EPSILONS = 64.0

@@ -8,7 +8,7 @@ segments meet, both are the same (15).
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -19,13 +19,11 @@ from cspr_jax.numerics import elementary
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import normalised
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64

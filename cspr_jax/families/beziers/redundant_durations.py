@@ -10,7 +10,6 @@ T, and only the durations that are tried are decided.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -22,12 +21,10 @@ from cspr_jax.families.beziers.redundant_verdicts import proofs, slacks_at, verd
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH, SAMPLES = 512, 65
 # Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far

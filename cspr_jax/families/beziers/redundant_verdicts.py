@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +18,7 @@ from jax import Array
 from cspr_jax.families.beziers.motion import Bezier, many_bounds
 from cspr_jax.motion.limits import other_slacks
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import centred
@@ -26,9 +26,6 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of
 from cspr_jax.verification.proved_verdicts import Verdicts
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Segments that are proved together, and the largest margin over the weight a cable that counts for searches: on cables
 # that tighten each other without largest tensions it has no bound.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -14,9 +14,7 @@ from cspr_jax.families.beziers.motion import Bezier, end_acceleration
 from cspr_jax.families.beziers.verdicts import verdicts
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 @dataclasses.dataclass(frozen=True)

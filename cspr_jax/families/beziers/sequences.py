@@ -6,7 +6,7 @@ before it, (15).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,10 +21,8 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.slacks import slacks
 from cspr_jax.numerics.search.constrained_minima import Verified, constrained_minimum
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import spool_radius
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Shortest and longest duration that is tried, over that of a fall by the robot's radius.
 SHORTEST, LONGEST = 0.1, 40.0

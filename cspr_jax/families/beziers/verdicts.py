@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -14,14 +13,12 @@ from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.force_balance import pseudotensions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack, with_touched
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Segments computed together: of a plan, and of arrays.
 BATCH, MANY = 256, 8192

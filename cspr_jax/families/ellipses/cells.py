@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -18,15 +17,13 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Roundings of a margin, in parts of the largest number in it, with a reserve.
 MARGIN_ERROR = 256.0 * float(np.finfo(float).eps)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -22,15 +21,13 @@ from cspr_jax.families.ellipses.hull import formula_hull
 from cspr_jax.families.ellipses.rotation import Rotation, rotation_state
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.bounds.affine_bounds import constant
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.criteria import criteria
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 ANGLES = 128  # samples of a turn where there are many frequencies
 FINE = 4096  # for one frequency alone

@@ -19,7 +19,7 @@ Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The f
 from __future__ import annotations
 
 from functools import partial, reduce
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,9 +28,7 @@ from jax import Array
 
 from cspr_jax.families.ellipses.hull import SpoolHull
 from cspr_jax.numerics.batches import in_batches, in_parts
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 BATCH = 16384  # ellipses
 LARGEST = 1 << 20  # ellipses in the part of one of two threads

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jax import Array
@@ -10,11 +10,9 @@ from scipy.spatial import ConvexHull
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Spools count as in one plane within this part of the radius of the robot.
 IN_PLANE = 1e-9

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -27,13 +27,11 @@ from cspr_jax.motion.amplitudes import Amplitude, derivatives, from_pieces, name
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64

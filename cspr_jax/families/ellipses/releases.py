@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -29,11 +29,9 @@ from cspr_jax.families.ellipses.hull import formula_hull
 from cspr_jax.families.ellipses.transfers import Turning, motion_between
 from cspr_jax.launch.flight import Parabola, aimed, flown
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import proof_of, sampled_proof
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Times of flight of a grid, over the time of a fall from the plane of the spools to the centre, and their number.
 SHORTEST = 0.01

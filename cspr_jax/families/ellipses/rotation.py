@@ -9,7 +9,7 @@ of the last one, as its half-axes do.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,9 +20,7 @@ from cspr_jax.numerics.bounds.function_bounds import sincospi
 from cspr_jax.numerics.bounds.rotation_bounds import RotationBounds
 from cspr_jax.numerics.elementary import as_float64, length
 from cspr_jax.numerics.linear import rotations
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 class Rotation(NamedTuple):

@@ -14,7 +14,7 @@ those three count as rotations in which the kinetic energy of rotation is the la
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,12 +22,10 @@ import numpy as np
 import scipy.linalg
 
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import tensions
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class RotationFrequencies(NamedTuple):

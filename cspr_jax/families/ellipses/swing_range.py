@@ -13,7 +13,7 @@ is the point of a box, cut by planes parallel to that of the spools, that is nea
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,12 +23,10 @@ from cspr_jax.families.ellipses.hull import hull_of
 from cspr_jax.maps.release_box import ReleaseBox
 from cspr_jax.maps.releases import Releases
 from cspr_jax.motion.limits import limits_set
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 SHORTEST = 0.003  # time of flight, over the longest one
 GRID = 513  # times of flight

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import jax
 import numpy as np
@@ -30,14 +30,11 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot, tensions
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.verification.proved_answers import proved_answers
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
-
 
 BATCH = 128
 

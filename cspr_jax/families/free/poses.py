@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -21,14 +21,12 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.statics.wrench_balance import at_rest
 from cspr_jax.verification.criteria import judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
 REGULAR, SHALLOW = 1e-2, 0.5

@@ -7,7 +7,7 @@ corrects each smallest bound; the ratio is searched for on finer and finer grids
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,9 +18,7 @@ from cspr_jax.families.lines.motion import s_curve
 from cspr_jax.families.lines.s_model import LeastDuration
 from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensions_at
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Samples of a piece of the S-model, and of half of another law.
 SAMPLES = 33

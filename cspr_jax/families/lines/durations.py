@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -19,13 +19,11 @@ from cspr_jax.families.lines.slacks import LineSlacks, line_slacks
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, in_one_plane, plane_normal
 from cspr_jax.robots.statics.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 BATCH, BATCH_OF_SEARCH = 4096, 16
 Rule = Literal["optimum", "thesis"]

@@ -10,18 +10,16 @@ positive. If the spools lie in one plane, that is so everywhere below them or no
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius
 from cspr_jax.robots.statics.wrench_sets import FLAT, normals_to, spanning
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 @jax.tree_util.register_dataclass

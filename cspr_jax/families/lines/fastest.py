@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,14 +15,12 @@ from cspr_jax.families.lines.verdicts import acceleration_slack, limits_at_rest,
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_parts
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.point_mass import in_one_plane, spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Lines that a thread computes at a time, where there is something to search or to prove.
 PART = 256

@@ -8,18 +8,15 @@ Otherwise, and where p or T - p is so short that its digits are lost, every moti
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.families.lines.durations import Rule, names_of
 from cspr_jax.families.lines.fastest import fastest
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)

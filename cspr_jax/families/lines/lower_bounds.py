@@ -7,16 +7,12 @@ The limit of the cables' accelerations restricts fast motions further; that is l
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import numpy as np
 
 from cspr_jax.families.lines.slacks import LineSlacks
 from cspr_jax.numerics.bounds.interval_jets import Jet, lowest
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 CELLS = 256
 # Numbers that are held together: cells by faces by cables.

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -19,13 +18,11 @@ from jax import Array
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64

@@ -9,7 +9,6 @@ can lie. Blocks whose bound lies below a slack that is attained elsewhere are ha
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -19,9 +18,7 @@ from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.bounds.interval_jets import Jet, lowest
 from cspr_jax.numerics.polynomials import bounds, derivatives, over
 from cspr_jax.numerics.search.block_minima import MinimumBlocks, Proved, smallest
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Numbers that are held together: blocks by faces by cables.
 TOGETHER = 1 << 20

@@ -9,7 +9,7 @@ then to brake at it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,9 +19,7 @@ from jax import Array, lax
 from cspr_jax.families.lines.faces import Sides
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.search.minima import Bracket, golden_step, inner_points
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 ROUNDS = 24
 # Samples of half a motion by a law without a parameter, and golden sections between two of them.

@@ -8,7 +8,7 @@ formulas are written once: arrays go in where a motion is searched, interval jet
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,11 +19,9 @@ from cspr_jax.families.lines.faces import line_faces
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.interval_jets import Jet
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.limits import LIMITS
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 TAUT = "taut"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import numpy as np
@@ -15,9 +15,7 @@ from cspr_jax.families.lines.verdicts import laws_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -18,15 +18,13 @@ from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.limits import limits_set, scales, slack
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts, plain_slack, with_touched
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 
 @jax.jit

@@ -7,7 +7,7 @@ import functools
 import math
 import operator
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from cspr_jax.families.paths.least_time.tightening import BindingName
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.cause import Cause
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
 # decimals of places, m.

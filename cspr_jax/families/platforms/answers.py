@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,11 +22,9 @@ from cspr_jax.families.platforms.end_acceleration import AT_REST
 from cspr_jax.families.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.families.platforms.platform_segment import PlatformSegment, take_segments
 from cspr_jax.motion.answers import Answers
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.fewest_limits import Refused, rank
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 NEVER = np.iinfo(int).max
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,14 +13,12 @@ import numpy as np
 from cspr_jax.families.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.families.platforms.platform_segment import PlatformSegment, pose_segment, take_segments
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.fewest_limits import FewestLimits, Refused
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
 
 BATCH = 2048
 # Number of candidates that are held at a time.

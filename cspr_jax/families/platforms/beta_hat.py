@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -11,12 +10,10 @@ import numpy as np
 from cspr_jax.families.platforms.end_acceleration import endpoint
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_balance import determinant_ratio, is_regular
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # Larger values of beta-hat have never gained anything, docs/theory.md.
 LARGEST = 12.0

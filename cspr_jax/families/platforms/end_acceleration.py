@@ -6,20 +6,18 @@ without its factor 2, since the angle of the rotation is gamma beta. The tension
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.elementary import length, solved
 from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot, rays
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_balance import jacobian
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
 AT_REST = -1.0

@@ -9,7 +9,7 @@ speed and angular acceleration are linear in the two values of beta-hat. The mec
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -19,9 +19,7 @@ from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear.lanes import Matrix, Vector, about_axis
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 
 class Swings(NamedTuple):

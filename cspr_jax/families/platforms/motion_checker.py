@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import jax
 import numpy as np
@@ -13,12 +13,10 @@ from cspr_jax.families.platforms.platform_segment import PlatformSegment, durati
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # Cases of a batch for few and for many of them: a batch is always full, and each of these is compiled for.
 FEW, MANY = 256, 2048

@@ -9,7 +9,7 @@ The angle of the envelope stays within [0, pi], since both of its ends have a sc
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,9 +18,7 @@ from jax import Array
 
 from cspr_jax.numerics.elementary import length, polynomial, sincospi
 from cspr_jax.numerics.linear import rotations
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
+from cspr_jax.numerics.shapes import Bool, Float, Num
 
 # Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
 # these numbers, sin(r) / r where r^2 is below the other.

@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,6 +31,7 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.rotation_bounds import unit_rotation_bounds
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point, spool_radius
@@ -40,10 +41,6 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.verification.bounds.swing_bounds import swing_bounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
-
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64

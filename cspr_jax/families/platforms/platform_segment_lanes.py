@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -29,9 +29,7 @@ from cspr_jax.numerics.linear.lanes import (
     materialized,
     rotation_matrix,
 )
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 # Degree of the Chebyshev fits, on s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they
 # are accurate to 2e-15. The derivative of the fit of W would be wrong by 3e-10.

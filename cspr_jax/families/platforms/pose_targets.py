@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,11 +14,9 @@ from cspr_jax.families.platforms.motion_checker import MotionChecker
 from cspr_jax.motion.answers import joined
 from cspr_jax.numerics.batches import in_parts
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Time functions of the rotation that take a separate beta-hat at each end; None stands for the default.
 _SEPARATE = (None, "beta_ff")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jax import Array
@@ -11,9 +10,7 @@ from jax import Array
 from cspr_jax.families.platforms.oscillating_slerp import Slerp, angle_ratio, sinc
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, joined, norm_squared, squared
 from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 # Rounding of the derivatives that recurrences give, in parts of their magnitude or of 1, is less.
 DERIVATIVE_ERROR = 1e-12

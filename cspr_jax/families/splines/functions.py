@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -16,10 +15,8 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 @jax.tree_util.register_dataclass

@@ -6,7 +6,6 @@ A screen bounds the margin of every number of arcs from above; `families.swings.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,12 +20,10 @@ from cspr_jax.motion.amplitudes import boundary_errors
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Largest number of segments that each thread holds at a time.
 PART = 16 * screen.BATCH

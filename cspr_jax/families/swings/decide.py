@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,14 +31,12 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 # Segments computed at a time where little is computed for each.
 BATCH = 4096

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.model.robot import Robot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

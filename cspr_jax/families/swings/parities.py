@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import numpy as np
 
 from cspr_jax.families.swings.hypocycloid import Segment
-
-if TYPE_CHECKING:
-    from jaxtyping import Int, Num
+from cspr_jax.numerics.shapes import Int, Num
 
 
 def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:

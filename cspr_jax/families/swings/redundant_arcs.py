@@ -10,7 +10,6 @@ per cable.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +23,7 @@ from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.search.minima import narrowed
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import centred
@@ -31,9 +31,6 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import proof_of
 from cspr_jax.verification.smallest_proved import NONE, smallest_proved
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 BATCH = 512
 FEW = 4  # samples an arc, to begin with

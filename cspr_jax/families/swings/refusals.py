@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import numpy as np
 
@@ -14,12 +12,10 @@ from cspr_jax.families.swings.proof.limit_screen import broken_at_samples, upcom
 from cspr_jax.families.swings.proof.verdicts import SMALL, first_pass, is_met_at_samples, prove
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.verification.fewest_limits import FewestLimits, Refused
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
 
 
 def refusals(

@@ -11,16 +11,14 @@ are traced, and written down for XLA, as calls of a few.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import ROUNDING
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 
 class AffineBounds(NamedTuple):

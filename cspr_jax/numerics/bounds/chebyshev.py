@@ -14,12 +14,10 @@ from __future__ import annotations
 import functools
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 DEGREE = 18
 # Bound of Lebesgue's constant of the nodes, by which an error of the values can grow between them.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -11,9 +10,7 @@ from jax import Array
 
 from cspr_jax.numerics import elementary
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, flat, rounded
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+from cspr_jax.numerics.shapes import Bool, Float
 
 LARGEST_SINE = 0.9
 

@@ -8,12 +8,11 @@ further below the chord of its ends than w^2 / 8 times the largest second deriva
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 Interval = tuple[np.ndarray, np.ndarray]
 

@@ -8,15 +8,13 @@ parabola, which a block within one piece may get, the remainder is smaller.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import ROUNDING
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class PieceParts(NamedTuple):

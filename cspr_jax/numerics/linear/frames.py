@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Unit quaternion of no rotation, scalar first.
 IDENTITY = (1.0, 0.0, 0.0, 0.0)

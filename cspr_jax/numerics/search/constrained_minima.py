@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,9 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
 Parts = Callable[[Any, Array], tuple[Array, Array]]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,9 +19,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.numerics.batches import in_batches, in_parts
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
 # margin ().

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+from cspr_jax.numerics.shapes import Float, Int
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 

@@ -18,6 +18,7 @@ import numpy as np
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.outputs.motion_files import LARGEST_ROWS, rows_at
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -25,7 +26,6 @@ from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.model.shapes import Body, Obstacle, inward, rotated
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Int
     from scipy.spatial.transform import Rotation
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one

@@ -6,19 +6,17 @@ import contextlib
 import dataclasses
 import threading
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.outputs.mujoco.mjcf import model_xml
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import STEP, Played, Suspended, coordinates, played, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 _LENT = threading.Lock()
 

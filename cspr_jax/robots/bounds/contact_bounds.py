@@ -15,14 +15,13 @@ they may cross for some time; they count as `Bodies.deepest` deep then.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, rotated, stacked
 from cspr_jax.numerics.bounds.function_bounds import changes_sign
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.contact_bodies import Bodies, Shape
@@ -38,9 +37,6 @@ from cspr_jax.robots.contacts.convex_gaps import (
 )
 from cspr_jax.robots.contacts.interference_lanes import residual
 from cspr_jax.robots.model.patterns import PATTERNS
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 CORNER_ERROR = 1e-14  # rounding of the corners of shapes, over the extent of a scene
 POLAR = 1e-12  # cosines up to which directions point away from a sector

@@ -18,21 +18,19 @@ smallest value, d_k is made of the sum of D_kj phi_j, which is at most y w' for 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array, lax
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm, rotated
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Surplus of a solution, and smallest change of tensions, as parts of the largest of them.
 SURPLUS = 1e-9

@@ -15,7 +15,7 @@ bounds r from above.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,11 +23,9 @@ from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, rotated, squares
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.nearest_face import NearestFace, nearest_face
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class WitnessTensions(NamedTuple):

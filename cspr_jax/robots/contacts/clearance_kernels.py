@@ -7,7 +7,7 @@ pair.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ from jax import Array, lax
 
 from cspr_jax.numerics.linear import lanes
 from cspr_jax.numerics.linear.lanes import Matrix, Vector
+from cspr_jax.numerics.shapes import Complex, Float, Int
 from cspr_jax.robots.contacts.clearance_lanes import (
     Polyhedron,
     boxes,
@@ -26,9 +27,6 @@ from cspr_jax.robots.contacts.clearance_lanes import (
     segment_hull,
     segments,
 )
-
-if TYPE_CHECKING:
-    from jaxtyping import Complex, Float, Int
 
 __all__ = [
     "Ball",

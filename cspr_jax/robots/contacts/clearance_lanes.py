@@ -9,7 +9,7 @@ angle.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,9 +17,7 @@ from jax import Array, lax
 
 from cspr_jax.numerics.elementary import nan_ignoring_min
 from cspr_jax.numerics.linear.lanes import Vector, cross, dot
-
-if TYPE_CHECKING:
-    from jaxtyping import Complex, Float
+from cspr_jax.numerics.shapes import Complex, Float
 
 Numbers = Sequence[Array]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts import clearance
 from cspr_jax.robots.contacts.clearance import ContactPair, Scene
@@ -15,9 +16,6 @@ from cspr_jax.robots.contacts.convex_gaps import BOX, BOX_SIGNS, FacePlanes
 from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
 from cspr_jax.robots.model.shapes import Box, Cylinder, Hull, is_flat
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Over the extent of a scene:
 DEEPEST = 1e-4  # depth below which penetrations are not distinguished

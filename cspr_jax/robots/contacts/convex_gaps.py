@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,10 +20,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm_squared
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import nearest
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Edges at a smaller angle than about this count as parallel: their common normal is not well known.
 PARALLEL_SQUARE = 1e-8

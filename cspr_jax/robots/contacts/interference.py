@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.robots.model.platform import PlatformRobot, rays, separate_pairs
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int
 
 # Points nearer than this part of the platform's extent are one corner.
 SAME = 1e-9

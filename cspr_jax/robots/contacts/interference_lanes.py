@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import Matrix, Vector, cross, dot, rotated_back
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import PARALLEL
 from cspr_jax.robots.statics.wrench_lanes import CableLanes
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 TINY = 1e-30  # m^2
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.patterns import Pattern
 from cspr_jax.robots.model.point_mass import LARGEST_LENGTH, checked_coordinates
 from cspr_jax.robots.model.spool_plane import is_on_line
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Points nearer to each other than this part of the largest distance are one point.
 SAME = 1e-9

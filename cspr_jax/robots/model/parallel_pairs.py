@@ -12,15 +12,12 @@ NumPy alone, since files are checked without jax.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.spool_plane import is_on_line, is_vertical
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 COUNT = 6
 # Tolerance, as part of the largest distance of a spool from the centroid of all: for cables of a pair to be parallel,

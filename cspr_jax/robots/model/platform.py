@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +17,7 @@ from jax import Array
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Coordinates3, Inertia, PointOfEachCable, Positive
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.body_geometry import checked_centre, checked_inertia, checked_platform, is_same
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -32,9 +32,6 @@ from cspr_jax.robots.model.point_mass import (
 )
 from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 RIGID = "3R3T"
 

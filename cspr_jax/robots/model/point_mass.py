@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,7 @@ from jax import Array
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import PointOfEachCable, Positive
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.pulleys import Pulleys, exits
@@ -25,9 +26,6 @@ from cspr_jax.robots.model.robot import Robot
 from cspr_jax.robots.model.spool_plane import AT_P0 as AT_P0
 from cspr_jax.robots.model.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical, spread
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.

@@ -10,7 +10,7 @@ n = (r v - s K v) / v.v and t = (s v + r K v) / v.v; the only angle needed is th
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,9 +20,7 @@ from jax import Array
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.lanes import Vector, combined, dot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 LARGEST_RADIUS = 1e6  # m, as coordinates
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+from cspr_jax.numerics.shapes import Bool, Float
 
 # Below this ratio points count as lying on a line, or their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6

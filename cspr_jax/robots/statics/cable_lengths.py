@@ -11,16 +11,12 @@ distance of B from this axis. Since w = r (1 - t . k) + s (t . e), the second de
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.pulleys import exits
 from cspr_jax.robots.model.robot import Robot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def moved_lengths(

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar, relative_acceleration
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.statics.cable_lengths import moved_lengths
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def pseudotensions(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,12 +22,10 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.numerics.linear.lanes import about_axis
 from cspr_jax.numerics.linear.rotations import about_vertical
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics import wrench_balance
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Axes that differ less than this from the reference axes count as equal to them.
 ALIGNED = 1e-6

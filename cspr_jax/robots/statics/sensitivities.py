@@ -14,19 +14,17 @@ sqrt 3 with three cables, and only cables at right angles reach this.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.robot import Robot, check_determined
 from cspr_jax.robots.statics.wrench_balance import at_rest, is_regular, normalised_determinant
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 _TRANSLATIONS = 3
 

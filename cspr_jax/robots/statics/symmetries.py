@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.numerics.linear.rotations import about_vertical
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.platform import PlatformRobot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 LARGEST_FOLD = 6
 # Points nearer to each other than this part of the robot's largest coordinate are the same.

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot, rays, wrench_per_mass
 from cspr_jax.robots.model.point_mass import cable_units, plane_normal, rest_point
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.cable_lengths import moved_lengths
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Normalised determinants up to this count as singular, since rounding may decide their sign.
 SINGULAR = 1e-6

@@ -8,16 +8,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, rotated, rotated_back
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 CABLES = 6  # the number for which the adjugates and Laplace's expansion here are written
 

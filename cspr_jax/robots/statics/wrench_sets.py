@@ -12,7 +12,6 @@ import dataclasses
 import functools
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -20,13 +19,11 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration
 from cspr_jax.robots.model.robot import Robot
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
 FLAT = 1e-12

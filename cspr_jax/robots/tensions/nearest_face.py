@@ -7,18 +7,16 @@ N_S^T x - sign r = limit_S - t0_S, one small system.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import beside_faces, face_distances, one_sided_faces, spanning
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # A tension without a largest value is held below so many times the largest that the wrench needs.
 CAP = 1e3

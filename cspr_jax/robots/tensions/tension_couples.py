@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import LEVEL, SPATIAL, PointMassRobot, relative_acceleration
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def is_rectangle(base_points: Float[np.ndarray, "n_cables 3"]) -> bool:

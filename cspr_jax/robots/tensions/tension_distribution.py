@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,11 +23,9 @@ from jax import Array, lax
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
 # the second.

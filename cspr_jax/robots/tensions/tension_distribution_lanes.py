@@ -8,7 +8,7 @@ allow: on each line they leave an interval, whose point nearest to 0 is a foot o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import jax
 import jax.numpy as jnp
@@ -18,11 +18,9 @@ from jax import Array, lax
 from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts
 from cspr_jax.numerics.elementary import nan_ignoring_min
 from cspr_jax.numerics.linear.lanes import materialized
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.tension_distribution import TENSION_ERROR, WITHIN, Distribution
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 Lanes = Sequence[Array]
 

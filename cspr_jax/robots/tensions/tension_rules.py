@@ -9,7 +9,7 @@ closed form found tensions for 12 % of the feasible poses (35 % with wider limit
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from jax import Array, lax
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import double_precision, solved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.tensions.tension_distribution import (
     TENSION_ERROR,
@@ -33,9 +34,6 @@ from cspr_jax.robots.tensions.tension_distribution import (
     projected,
 )
 from cspr_jax.robots.tensions.tension_distribution_lanes import FREE, least_norms
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 4096
 # The p-norm takes so many steps of Newton's method, while the weight of the limits decreases from first to last, which

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers, overlaps, piecewise_bounds
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import ROUNDING
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class TimeBounds(NamedTuple):

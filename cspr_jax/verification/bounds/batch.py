@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.verification.bounds.amplitude_bounds import time_bounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 BATCH = 64
 

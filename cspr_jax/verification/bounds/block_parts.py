@@ -7,15 +7,13 @@ there; the rest shrinks with the square of its length at a simple root, while ha
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Bool, Complex, Float
 from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Complex, Float
 
 # A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
 SMALL = 0.5

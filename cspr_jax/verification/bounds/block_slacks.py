@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
 from cspr_jax.numerics.bounds.function_bounds import changes_sign, determinant, magnitude_range
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions
@@ -33,9 +34,6 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import AT_INSTANTS, contact_criteria, criteria, judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Blocks that are bounded together, with contacts and without.
 BATCH = 64

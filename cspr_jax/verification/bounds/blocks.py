@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.motion.amplitudes import Amplitude
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 # A remainder of up to this part of a block does not add a block to a piece between knots.
 SLIVER = 0.3

@@ -6,12 +6,11 @@ of the platform, in which the attachment points do not move; for a point mass, t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+from cspr_jax.numerics.shapes import Bool, Float
 
 
 class Distances(NamedTuple):

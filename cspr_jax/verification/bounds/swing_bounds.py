@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, rotated, stacked
 from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 
 def swing_bounds(

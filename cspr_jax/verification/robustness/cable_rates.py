@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cspr_jax.numerics.elementary import unit_vectors
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 
 def rates_hold(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -17,6 +16,7 @@ from cspr_jax.motion.motion import BoundedMotion, Motion, common_shape
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import constant
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import Bodies, bodies_of, default_scene
@@ -26,9 +26,6 @@ from cspr_jax.verification.bounds.blocks import Blocks
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated_by
 from cspr_jax.verification.robustness.uncertain_slacks import blocks_hold, radii_of, states_fail, worst_directions
 from cspr_jax.verification.time_proof import FIRST
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 STATES = 256  # in one batch
 

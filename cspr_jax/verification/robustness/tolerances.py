@@ -9,17 +9,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Num
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 from cspr_jax.verification.bounds.blocks import Blocks
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, influence
 from cspr_jax.verification.robustness.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
-
-if TYPE_CHECKING:
-    from jaxtyping import Num
 
 # These are tried first, in their order. A multiple that fails is then divided by `RATIO` while it fails, down to
 # `SMALLEST`.

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +23,7 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, norm
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, attachments, balance_bounds, cable_bounds
 from cspr_jax.robots.bounds.uncertain_tensions import UncertainTensions, centre_wrench, uncertain_tensions, with_mass
@@ -33,9 +34,6 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import limit_slacks, tension_slacks
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 STEP = 1e-6  # displacement by which differences are taken, over the length of a cable
 NEAREST = 2  # criteria of which the worst displacements are sought

@@ -14,20 +14,18 @@ docs/theory.md. Then no such robot is singular either.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.elementary import unit_vectors
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.model.limits import Limits, Uncertainty
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, inverted, structure
 from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # Blocks without an enclosure have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")

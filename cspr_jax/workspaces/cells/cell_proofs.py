@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches, in_parts
 from cspr_jax.numerics.elementary import unit_vectors
 from cspr_jax.numerics.linear import lanes
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot, across_line
@@ -22,9 +22,6 @@ from cspr_jax.workspaces.cells.shifts import leaving_points, shifts
 from cspr_jax.workspaces.cells.worst_facet_normals import worst_facets
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 # Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
 PART, BATCH = 256, 1024

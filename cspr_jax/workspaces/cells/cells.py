@@ -18,12 +18,11 @@ Arrays are (cells, ...); coefficients of first order in x have one axis of lengt
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+from cspr_jax.numerics.shapes import Float, Int
 
 # Rounding may have added this fraction of the terms to a sum of up to some hundred products of float64 (2.2e-16 each),
 # with a reserve for rays, arms and rotations that are rounded themselves.

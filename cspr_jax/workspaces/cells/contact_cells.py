@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +22,7 @@ from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.rotations import matrix
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import Bodies, Shape, bodies_of
@@ -37,9 +38,6 @@ from cspr_jax.robots.contacts.convex_gaps import (
 )
 from cspr_jax.runtime import compile_options
 from cspr_jax.workspaces.cells.cells import smallest_quadratic
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 512
 # Over the largest coordinate: far above the rounding of bounds, far below what anybody measures.

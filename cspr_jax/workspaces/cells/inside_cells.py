@@ -20,10 +20,11 @@ quite I and Z0 f0 not quite w. Where |T| < 1 the rank of Z(x) is full, too, sinc
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.cells.cells import (
     CELL_ERROR,
     Cells,
@@ -33,9 +34,6 @@ from cspr_jax.workspaces.cells.cells import (
     pair_norm,
     smallest_quadratic,
 )
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class _DensityChange(NamedTuple):

@@ -22,10 +22,11 @@ move, K = 0, will do where all cables keep away from being normal to it; then th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.workspaces.cells.cells import (
     CELL_ERROR,
     Cells,
@@ -34,9 +35,6 @@ from cspr_jax.workspaces.cells.cells import (
     norm_bound,
     smallest_quadratic,
 )
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int
 
 
 class Products(NamedTuple):

@@ -10,16 +10,14 @@ of width 4 r and height 2 r.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.workspaces.poses import geometry
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 4096
 # Diagonal of the range within which exits lie, over the radius of the pulley.

@@ -9,21 +9,18 @@ along which the effector can move and about which it can turn: the rows of the w
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64, unit_vectors
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.workspaces.cells.cell_proofs import cable_wrenches
 from cspr_jax.workspaces.cells.shifts import Shifts
 from cspr_jax.workspaces.poses import geometry
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 4096
 

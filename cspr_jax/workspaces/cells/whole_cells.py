@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.search import WorkspaceAnswers
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int
 
 # Cells that are proved at a time.
 ROUND = 65536

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import normals_to, spanning
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Components of a cocircuit below this part of the largest one do not make it void.
 ZERO = 1e-9

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.poses.facet_normals import CableSubsets
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Singular values count as zero below the first of these parts of the largest one, or below the second number, since
 # columns are unit vectors.

@@ -14,17 +14,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import cross, dot, largest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import spanning
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.

@@ -8,7 +8,6 @@ has stored are three times as slow as loops over its arguments.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -18,14 +17,12 @@ from jax import Array
 from cspr_jax.numerics.linear import lanes
 from cspr_jax.numerics.linear.lanes import Vector
 from cspr_jax.numerics.linear.rotations import matrix
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot, across_line
 from cspr_jax.robots.model.pulleys import Pulleys, exit_lanes, exits
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
 
 
 def wrench_columns(

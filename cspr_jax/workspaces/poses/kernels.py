@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.numerics.linear.lanes import largest
+from cspr_jax.numerics.shapes import Float, Shaped
 from cspr_jax.workspaces.poses import margins
 from cspr_jax.workspaces.poses.facet_normals import (
     CABLES,
@@ -28,9 +29,6 @@ from cspr_jax.workspaces.poses.facet_normals import (
     relation,
 )
 from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, FacetLimits, Wrenches, length, one_norm
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Shaped
 
 # Up to so many cocircuits the loop is unrolled.
 UNROLLED = 10

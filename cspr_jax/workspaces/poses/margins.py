@@ -6,16 +6,14 @@ Where the bounds lie apart, `workspaces.poses.exact` answers the pose by singula
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import largest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.poses.facet_normals import Column, product
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
 # cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.

@@ -7,7 +7,7 @@ released on it. All else follows: the velocity of the release (26), the control 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,11 +25,9 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.differential_evolution import evolved
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 UNKNOWNS, POPULATION = 6, 64
 # Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled

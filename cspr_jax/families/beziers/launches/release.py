@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,9 +15,7 @@ from cspr_jax.maps.release_box import Range, box_of
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear.frames import Frame
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 def through(

@@ -9,14 +9,12 @@ where S softens the equations: they may be missed by S (y - y0), which the objec
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.families.free.search.derivatives import EquationValues
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Part of its trace that keeps a matrix regular which is only so within rounding.
 ROUNDED = 1e-14

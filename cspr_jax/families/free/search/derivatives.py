@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,13 +18,11 @@ from jax import Array
 from cspr_jax.families.free.search.determinants import determinant, unit_wrenches, with_derivatives
 from cspr_jax.families.free.search.equations import residual_at, state_of
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.criteria import judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 256
 # Entries of x behind the coordinates.

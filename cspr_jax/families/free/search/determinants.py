@@ -10,18 +10,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.state import State
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Rows of a minor; those of forces and of moments of a platform in space.
 MINOR = 3

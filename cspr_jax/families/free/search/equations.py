@@ -8,7 +8,7 @@ need no rule, and no matrix is inverted, which may be singular on the path.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +17,7 @@ from jax import Array
 from cspr_jax.curves.spline import turning_of
 from cspr_jax.motion.limits import other_limits
 from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -26,9 +27,6 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import BELOW, Criterion, judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 BATCH = 128
 # Entries of x behind the coordinates.

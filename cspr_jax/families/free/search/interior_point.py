@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,7 @@ from cspr_jax.families.free.search.condensation import Softness, times, transpos
 from cspr_jax.families.free.search.newton import newton_step
 from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints, descended
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+from cspr_jax.numerics.shapes import Bool, Float
 
 # Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
@@ -11,9 +11,7 @@ from cspr_jax.families.free.search.basis import LOCAL, Basis
 from cspr_jax.families.free.search.condensation import Softness, condensed, times, transposed
 from cspr_jax.families.free.search.derivatives import SCALARS, EquationValues
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Added to the diagonal where the matrix has a negative curvature: smallest, at first, and largest; by what it grows and
 # shrinks; tries.

@@ -7,14 +7,12 @@ all tensions move, together. Between motions with the same level, time decides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.families.free.search.equations import ValueBounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+from cspr_jax.numerics.shapes import Bool, Float
 
 # Weight of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
 LITTLE = 1e-4

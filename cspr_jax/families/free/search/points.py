@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,7 @@ from cspr_jax.families.free.search.condensation import Softness, repaired_values
 from cspr_jax.families.free.search.derivatives import SCALARS, EquationValues
 from cspr_jax.families.free.search.newton import Step, assembled_gradient
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
-
+from cspr_jax.numerics.shapes import Float
 
 # Multipliers of equations beyond which their mean counts as the unit of errors; keeps the metric of the tensions
 # regular.

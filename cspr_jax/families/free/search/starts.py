@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import zip_longest
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.tasks import Tasks
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point, spool_radius
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Largest number of arcs of swings; by how much of their length lines are deflected.
 ARCS, DEFLECTION = 3, 0.35

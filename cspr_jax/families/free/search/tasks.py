@@ -7,18 +7,16 @@ segments have. So the outer three control points at each end follow from the dur
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.families.free.search.basis import Basis
 from cspr_jax.families.free.search.derivatives import EquationValues, equation_values, residuals
 from cspr_jax.families.free.search.objectives import Objective
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Control points at each end that follow from the others.
 OUTER = 3

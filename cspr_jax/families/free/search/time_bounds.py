@@ -9,8 +9,6 @@ points up.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,15 +17,13 @@ from jax import Array
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.motion import common_shape
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.criteria import judged_poses
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Directions in the vertical plane through both positions; what bounds are lowered by, more than their rounding.
 ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9

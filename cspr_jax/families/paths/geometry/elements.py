@@ -5,16 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.config.gcode.reading import Move
 from cspr_jax.errors import InputError
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
-
+from cspr_jax.numerics.shapes import Float
 
 # Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
 LARGEST_PIECE = 0.125

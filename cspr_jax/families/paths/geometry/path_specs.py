@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +18,8 @@ from cspr_jax.families.paths.geometry.elements import arc_of, elements_of
 from cspr_jax.families.paths.geometry.section import PositionPath, Section, half_angles, section_of, turn
 from cspr_jax.families.paths.geometry.through_points import chords, through_points
 from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import UNIT_NORM
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Distance within which a file begins at the pose before it, m.
 MEETING = 1e-6

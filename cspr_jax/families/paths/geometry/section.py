@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -13,9 +13,7 @@ from scipy.interpolate import BPoly
 from cspr_jax.curves.interpolation import continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
 from cspr_jax.numerics.elementary import as_float64
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Orientations that differ by less are one orientation; half of the angle, rad.
 SAME_ORIENTATION = 1e-12

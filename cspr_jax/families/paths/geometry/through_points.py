@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -13,9 +12,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.families.paths.geometry.corners import Corners, position_paths_of
 from cspr_jax.families.paths.geometry.elements import SAME_PLACE, Straight
 from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, PositionPath, half_angles
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Part of the speed along the chords below which a spline stops, and samples of each of its pieces.
 STANDING, SAMPLES = 1e-6, 32

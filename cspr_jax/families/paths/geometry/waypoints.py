@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.motion.motion import Motion, states_at
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+from cspr_jax.numerics.shapes import Float, Int
 
 # Samples of a motion among which stops are sought, and the fewest of a smooth part.
 SAMPLES, FEWEST = 2000, 8

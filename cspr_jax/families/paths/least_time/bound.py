@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -17,14 +16,12 @@ from cspr_jax.families.paths.least_time.multipliers import dual_multipliers
 from cspr_jax.families.paths.least_time.nodes import BATCH, PathPoints, points_on, state_at
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
 from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # x at which the search for multipliers begins, at least, over its largest value.
 SMALLEST = 1e-9

@@ -8,12 +8,13 @@ Cartesian acceleration is one half-plane (Bobrow, Dubowsky and Gibson 1985; Vers
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
@@ -22,9 +23,6 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
 from cspr_jax.robots.tensions.nearest_face import beside_faces, one_sided_faces
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
 TANGENTS = 24

@@ -11,18 +11,16 @@ the last axis of all arrays, and are solved together.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # A half-plane whose coefficient of u is smaller bounds x alone. Steps of Newton, at most.
 FLAT, STEPS = 1e-12, 40

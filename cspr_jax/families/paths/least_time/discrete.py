@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from cspr_jax.families.paths.least_time.multipliers import SideHalfPlanes
 from cspr_jax.families.paths.least_time.nodes import PathGrid, grid_of, side_half_planes
 from cspr_jax.families.paths.least_time.smooth import NodeHalfPlanes
 from cspr_jax.motion.problem import Problem
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Path speeds are taken to be no larger than so many times that of a fall along the path.
 FASTER = 1e2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -13,9 +13,7 @@ from cspr_jax.families.paths.least_time.controllable import GridSolution, fastes
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
 from cspr_jax.numerics.batches import device_batch_size, padded
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, REPEATS = 32, 2

@@ -8,15 +8,13 @@ tridiagonal matrix.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from cspr_jax.families.paths.least_time.interior_point import interior_point
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Fractions of the x of a motion from which the search begins, one after the other: next to limits it may come to a
 # halt.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -14,14 +14,12 @@ from cspr_jax.curves.spline import Spline, piece_state, piece_values
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes, path_half_planes
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
 RAMP, SMALLER = 0.25, 5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -14,14 +14,11 @@ from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.nodes import points_on, state_at
 from cspr_jax.families.paths.least_time.static_tension import StaticTension, static_tension
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
-
 
 FLAGS = {row.name: row.flag for row in LIMITS}
 # Flag of a criterion, and its cable from 0 on, or None.

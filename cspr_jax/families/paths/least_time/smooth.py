@@ -10,15 +10,13 @@ From rest and to rest, s is the cube of time over the first and the last cell: a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
 
 from cspr_jax.families.paths.least_time.interior_point import interior_point
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Diagonals below and above the main one, with three unknowns a node; what keeps the matrix regular; smallest x over the
 # largest from which the search starts.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -12,15 +12,13 @@ from scipy.ndimage import maximum_filter1d
 from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.families.paths.least_time.discrete import GridMargins
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 from cspr_jax.verification.bounds.block_slacks import rate_slacks, speed_slacks
 from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.piece_slacks import Sides, close_bounds
 from cspr_jax.verification.proved_answers import TENSIONS
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.

@@ -7,7 +7,7 @@ off by what a quintic piece misses, which is returned.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, points_on
 from cspr_jax.numerics.elementary import as_float64
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Times in a cell at which the distance from the path is taken.
 FRACTIONS = (0.25, 0.5, 0.75)

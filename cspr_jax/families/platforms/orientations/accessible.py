@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -19,12 +19,10 @@ from scipy.sparse.csgraph import connected_components
 from cspr_jax.families.platforms.orientations.orientation_steps import OrientationSteps
 from cspr_jax.numerics.batches import in_threads
 from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.orientation_grids import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 # Steps along rays that are tried at a time: few rays go farther, and with the usual number of rays these steps fill

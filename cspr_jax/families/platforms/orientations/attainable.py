@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cspr_jax.families.platforms.answers import PlatformMotionAnswers, reached, trials
@@ -14,11 +12,9 @@ from cspr_jax.motion.answers import joined
 from cspr_jax.numerics.batches import in_parts
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.symmetries import NONE, Symmetries, alike
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Values of beta-hat tried at the target.
 VALUES = 20

@@ -7,7 +7,7 @@ the rank is full, on either side of the spools, and the platform is met only whe
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from cspr_jax.numerics.elementary import solved
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.linear.lanes import materialized, rotation_matrix
+from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.robots.cables import wrench_units
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.contacts.contact_bodies import default_scene, has_sectors
@@ -28,9 +29,6 @@ from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics import wrench_lanes
 from cspr_jax.robots.statics.wrench_balance import at_rest, determinant_ratio, is_regular, normalised_determinant
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int
 
 BATCH = 512
 # Gaps between cables below this part of the platform's radius count as zero. A cable that makes a smaller angle with

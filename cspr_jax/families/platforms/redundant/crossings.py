@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import cables_cross, platform_hit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 HALVINGS = 12
 # Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.

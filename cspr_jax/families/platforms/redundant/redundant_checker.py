@@ -12,7 +12,6 @@ a plan gives its shape.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -28,6 +27,7 @@ from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.minima import narrowed_times
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SAMPLES_UNDECIDED
 from cspr_jax.robots.model.platform import separate_pairs
 from cspr_jax.schema.verdicts import Verdict, conjunction
@@ -35,9 +35,6 @@ from cspr_jax.verification.proved_answers import proof_of
 from cspr_jax.workspaces.poses import exact
 from cspr_jax.workspaces.requirements import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Number of samples that are held at a time, and of samples of a motion that are screened at a time.
 MAX_SAMPLES, CHUNK = 200_000, 8

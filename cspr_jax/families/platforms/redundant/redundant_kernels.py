@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,11 +14,9 @@ from cspr_jax.families.platforms.platform_segment import PlatformMotion, Platfor
 from cspr_jax.motion.limits import other_slacks
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import cable_directions, gaps
 from cspr_jax.robots.model.platform import PlatformRobot
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 class PoseSamples(NamedTuple):

@@ -11,12 +11,11 @@ skipped.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+from cspr_jax.numerics.shapes import Float, Int
 
 # Rounding may move F, or a height, by this part of the product of the norms of its factors.
 PRODUCT_ERROR = 1e-13

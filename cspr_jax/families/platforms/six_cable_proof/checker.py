@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +32,7 @@ from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches, in_threads
 from cspr_jax.numerics.linear.lanes import dot, smallest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.model.limits import Limits
@@ -42,9 +42,6 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Largest number of blocks in a call, and of arcs that are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -24,9 +24,7 @@ from cspr_jax.families.platforms.platform_segment_lanes import PhaseLanes
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import polynomial, sincospi
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 # arccos(s) / sqrt(1 - s^2) is bounded up to this 1 - s, since it is singular at 2; and 1 - s counts as this at least.
 FARTHEST, NEAREST = 1.9, 0.1

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -27,6 +27,7 @@ from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import unit_vectors
 from cspr_jax.numerics.linear.lanes import materialized
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.robots.contacts.interference import between, contacts, nearest
 from cspr_jax.robots.contacts.interference_lanes import residual
 from cspr_jax.robots.model.limits import Limits
@@ -36,9 +37,6 @@ from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
 from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates, largest_moves
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 # Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6

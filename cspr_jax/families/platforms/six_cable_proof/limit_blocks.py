@@ -13,17 +13,15 @@ is met.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes
 from cspr_jax.numerics.linear.lanes import dot
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_lanes import CABLES, CableLanes, cable_rates
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # The length of a ray is analytic where the ray changes by less than this part of it: sqrt(2) - 1.
 STRAIGHT = 0.414

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int
+from cspr_jax.numerics.shapes import Bool, Float, Int
 
 # Number of parabolas that follow one another, how much nearer the points of each are, and the spread of values below
 # which they are not narrowed down.

@@ -10,7 +10,7 @@ smaller end less C h^2 / 8.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -24,15 +24,13 @@ from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.lanes import Vector, dot, largest, materialized, rotated_back, smallest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Steps of a block, and the times at their ends, from -1 to 1.
 STEPS = 4

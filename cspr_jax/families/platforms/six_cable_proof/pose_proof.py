@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -24,14 +23,12 @@ from cspr_jax.families.platforms.six_cable_proof.work_list import LIMITS_UNDECID
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
 
 # Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
 # where a platform moves fastest.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,12 +24,10 @@ from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.batches import device_batch_size, in_batches, row_by_row
 from cspr_jax.numerics.linear.lanes import cross, dot
+from cspr_jax.numerics.shapes import Bool, Float, Int, Num
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import balance, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Int, Num
 
 # Samples of one call; how many times more motions are screened than checked at a time; and the part of a batch up to
 # which motions count as few.

@@ -14,8 +14,6 @@ Below the readable form follow functions of many platforms, one lane a case, of 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 from jax import Array
 
@@ -25,6 +23,7 @@ from cspr_jax.motion.limits import limits_set, scales, slack, values
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.lanes import dot, largest, smallest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
@@ -42,9 +41,6 @@ from cspr_jax.robots.statics.wrench_lanes import (
 )
 from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -46,13 +46,11 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds import chebyshev
 from cspr_jax.numerics.linear import packed_arrays
 from cspr_jax.numerics.linear.lanes import dot, materialized
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
 # constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.

@@ -17,7 +17,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,14 +35,12 @@ from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
 
 # Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
 # are narrowed down from the samples of blocks, the number is fixed; for verdicts alone it grows from the first to the

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import smallest
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.verification.bounds.blocks import Blocks
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Slacks of limits nearer to zero are undecided, where double precision bounds them.
 LIMITS_UNDECIDED = 1e-12

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
 from cspr_jax.motion.amplitudes import Amplitude
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int, Num
+from cspr_jax.numerics.shapes import Float, Int, Num
 
 # Intervals between the samples of one block.
 INTERVALS = 16

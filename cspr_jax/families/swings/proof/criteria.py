@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
 
 import jax
 from jax import Array
@@ -14,12 +13,10 @@ from cspr_jax.families.swings.proof.slacks import each_taut_bounds, interval_bou
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.linear.lanes import largest, smallest
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 # Criteria that are no limits: taut cables, and the depth below the spools.
 BASIC = 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,13 +16,11 @@ from cspr_jax.families.swings.proof.limit_slacks import motion_bounds
 from cspr_jax.families.swings.proof.slacks import interval_bounds, row_bounds, swing_state, taut_bounds
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.shapes import Num
 from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
 from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates, largest_moves
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
-
-if TYPE_CHECKING:
-    from jaxtyping import Num
 
 PARTS = 4  # of an arc, to begin with
 BATCH = 1024  # blocks computed at a time

@@ -7,7 +7,6 @@ limit by more than rounding is a refutation; nothing is accepted here.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -22,10 +21,8 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.lanes import smallest_of_each
+from cspr_jax.numerics.shapes import Bool, Int, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Int, Num
 
 SAMPLES = 32
 # Tolerances by which a sample must lie below zero: twice as far as where `families.swings.proof.verdicts` refutes a

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -29,12 +29,10 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.bounds.value_and_derivatives import Bounds
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear.lanes import Vector, dot, largest
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal
 from cspr_jax.schema.limits import Limit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 
 class _CableState(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,10 +23,8 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import vertex
 from cspr_jax.numerics.linear.lanes import materialized, smallest_of_each
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 CANDIDATES = 3
 # An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.

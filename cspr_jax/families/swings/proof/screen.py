@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -25,10 +24,8 @@ from cspr_jax.families.swings.proof.slacks import largest_term
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.batches import row_by_row
 from cspr_jax.numerics.elementary import nan_ignoring_min, sincospi
+from cspr_jax.numerics.shapes import Float, Int, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int, Num
 
 SAMPLES = 32
 BATCH = 2048

@@ -13,7 +13,7 @@ derivative over an interval, from the closed form: it is what makes a verdict ho
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,9 +23,7 @@ from cspr_jax.families.swings.hypocycloid import Segment, oscillation, swing
 from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.numerics.bounds.value_and_derivatives import Bounds, hypotenuse
 from cspr_jax.numerics.elementary import sincospi
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 
 class SwingState(NamedTuple):

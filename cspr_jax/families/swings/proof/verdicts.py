@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -33,11 +32,9 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.lanes import smallest_of_each
+from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.runtime.persistent_jit import persistent_jit
-
-if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Num
 
 BATCH = 1024
 # Length of the batches of few segments: with limits, for which a full batch would take several times as long, and of

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -24,9 +23,7 @@ from jax import Array, lax
 from cspr_jax.motion.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
 from cspr_jax.numerics.elementary import vertex
 from cspr_jax.numerics.search.minima import GOLDEN, Bracket, golden_step, inner_points
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
 from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+from cspr_jax.numerics.shapes import Float, Num
 
 # Intervals of each piece of the amplitude function.
 INTERVALS = 64

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -31,10 +31,8 @@ from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.runtime.stages import stage
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
 
 # Samples of the screen; odd, so that they do not fall on the zeros of an oscillation.
 SAMPLES = 61

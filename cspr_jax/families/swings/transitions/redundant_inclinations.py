@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,11 +20,9 @@ from cspr_jax.families.swings.redundant_arcs import FEW, MANY, least_slacks
 from cspr_jax.families.swings.transitions.envelope_oscillations import LARGEST_INCLINATION
 from cspr_jax.families.swings.transitions.transition import depth_for
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 TRIED = 41  # inclinations of the first grid
 FINER = 9  # of each finer one

@@ -12,7 +12,6 @@ size it is a swing that stays between the target and its opposite point.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,10 +20,8 @@ from jax import Array
 from cspr_jax.families.swings import hypocycloid
 from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, rest_point
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 
 @jax.jit

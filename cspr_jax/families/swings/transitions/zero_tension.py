@@ -8,13 +8,11 @@ smallest weight, w_C the one of larger magnitude.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jax import Array
 
-if TYPE_CHECKING:
-    from jaxtyping import Float
+from cspr_jax.numerics.shapes import Float
 
 
 def least_oscillations(weights: Float[Array, "n_cables"], inclination: Float[Array, ""]) -> Float[Array, ""]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter
 from PIL import Image
 
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 # Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
 SAMPLES, EXACT, COLOURS = 8, 32, 256

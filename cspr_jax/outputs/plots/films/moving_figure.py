@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from PIL import Image
 
-if TYPE_CHECKING:
-    from jaxtyping import Int
+from cspr_jax.numerics.shapes import Int
 
 
 class MovingFigure(Figure):

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # A pose is outside where one of these margins is not positive.
 MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "length_margin", "speed_margin")

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.style.labels import COLOURS, chosen, robot_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.maps.conditions import EXCLUDED
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.outputs.plots.style.fixed_axes import table
@@ -28,9 +29,6 @@ from cspr_jax.outputs.plots.style.labels import (
 from cspr_jax.outputs.plots.style.layout import columns_of, in_degrees, in_whole_numbers, panels
 from cspr_jax.outputs.plots.style.word_ticks import worded
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 LINES = len(COLOURS)
 # Mark of a point of a margin that other conditions exclude.

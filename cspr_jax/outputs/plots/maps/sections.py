@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import matplotlib
 import numpy as np
@@ -15,6 +15,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.projections.polar import PolarAxes
 
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.outputs.plots.maps.conditions import EXCLUDED
 from cspr_jax.outputs.plots.maps.marks import draw_marks, marked
 from cspr_jax.outputs.plots.robots.obstacles import draw_obstacles
@@ -35,9 +36,6 @@ from cspr_jax.outputs.plots.style.word_ticks import word_scale, worded
 from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -14,6 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.maps.boundary import Boundary, BoundarySides, boundary, sides_of
 from cspr_jax.outputs.plots.maps.conditions import conditions, is_workspace
 from cspr_jax.outputs.plots.robots.obstacles import COLOUR as OBSTACLE
@@ -23,9 +24,6 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.style.scene import set_space, shape_of, signs_of, towards_eye
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 SPACE = ["x", "y", "z"]
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]

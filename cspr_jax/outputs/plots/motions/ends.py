@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 
-if TYPE_CHECKING:
-    from jaxtyping import Float, Int
+from cspr_jax.numerics.shapes import Float, Int
 
 # More way-points than these would hide the path.
 LARGEST_COUNT = 40

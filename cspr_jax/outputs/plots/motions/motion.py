@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.numerics.bounds.intervals import united
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.motions.motion_source import keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.robots.obstacles import draw_shadows
@@ -25,9 +26,6 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import PARTS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # By the quantity that a chart shows: the criteria that it shows. Those that no chart of a figure shows are in its chart
 # of the path, or of the tensions.

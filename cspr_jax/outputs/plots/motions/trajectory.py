@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,6 +16,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.motions.motion import doubt, point_words
 from cspr_jax.outputs.plots.robots.obstacles import AREA, draw_bodies, points_of
@@ -23,9 +24,6 @@ from cspr_jax.outputs.plots.robots.robot_along import moving
 from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.style.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, to_hex
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.maps.conditions import is_margin, said, shown_first
 from cspr_jax.outputs.plots.maps.sections import in_order
 from cspr_jax.outputs.plots.pages.page import packed
@@ -21,9 +22,6 @@ from cspr_jax.outputs.plots.style.word_ticks import FEASIBLE_COLOUR, REASONS, wo
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 # Quantities whose extremes are instructive.
 EXTREME = ("margin", "duration", "arcs", "oscillations")

@@ -8,15 +8,13 @@ import html
 import json
 import re
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import InputError
-
-if TYPE_CHECKING:
-    from jaxtyping import Num
+from cspr_jax.numerics.shapes import Num
 
 # Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,13 +13,11 @@ from matplotlib.patches import Patch, Polygon
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from cspr_jax.config.keys.obstacles import ObstacleKeys
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.robots.robot_at import hull_of, workspace_of
 from cspr_jax.outputs.plots.style.scene import across_and_up
 from cspr_jax.robots.model.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Points of a circle.
 CIRCLE_POINTS = 48

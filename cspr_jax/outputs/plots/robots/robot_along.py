@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.robots.obstacles import points_of
 from cspr_jax.outputs.plots.robots.robot_at import cable_points, hull_of
 from cspr_jax.robots.model.shapes import Hull, rotation_matrix
 from cspr_jax.schema.limits import LIMITS
-
-if TYPE_CHECKING:
-    from jaxtyping import Int
 
 
 class Moving(NamedTuple):

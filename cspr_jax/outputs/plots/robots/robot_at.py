@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,13 +10,11 @@ from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float, Num
 
 ON_ARC = 9  # points that an arc is drawn through, its ends included
 TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Float
 
 # Axes whose names in files are no words.
 WORDS = {

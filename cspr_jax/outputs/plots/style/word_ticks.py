@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import matplotlib
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 
+from cspr_jax.numerics.shapes import Num
 from cspr_jax.outputs.plots.style.colours import NONE_COLOUR, Scale
 from cspr_jax.outputs.plots.style.labels import COLOURS
 from cspr_jax.schema.limits import LIMITS
@@ -15,9 +14,6 @@ from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.store.reading.result import Result
-
-if TYPE_CHECKING:
-    from jaxtyping import Num
 
 OF_LIMITS = {limit.flag: (limit.legend, limit.colour) for limit in LIMITS}
 # Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and

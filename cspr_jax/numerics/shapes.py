@@ -1,0 +1,10 @@
+"""Types of arrays with their shapes, `Float[Array, "n 3"]`, for readers and type checkers: nothing evaluates them."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Complex, Float, Int, Num, Shaped
+else:
+    Bool = Complex = Float = Int = Num = Shaped = Any
+
+__all__ = ["Bool", "Complex", "Float", "Int", "Num", "Shaped"]
