@@ -122,7 +122,7 @@ others. CSV files of feasible plans do not have that column.
 `cspr plot FILE.h5` draws path and tensions over time. With `--quantity trajectory` it draws the path in space, with the
 robot where segments begin and end and its cables coloured by tension; with `--quantity tensions` the band of tensions
 over time and the limits; with `--quantity summary` all of these on one page, with a table of the segments. With
-`--quantity acceleration` (point masses) it draws all accelerations that the cables can give at one instant,
+`--quantity acceleration` (point masses) it draws all accelerations that the cables can give at one time,
 `--at t=1.2` or that of the smallest margin, and marks the motion's; with `--quantity path_acceleration` (straight
 lines) it draws that column over the path, between its bounds; with `--quantity landing` the landings of a sample of
 throws. Several motions, such as those of families on the same targets, are drawn in one picture: paths, smallest

@@ -99,7 +99,7 @@ IMAGES = {
         "plan",
     ),
     "acceleration_sections": Image(
-        "Accelerations that four cables can give at an instant of the line: sections of a cone (Boralugoda Fig. 2.8).",
+        "Accelerations that four cables can give at one time of the line: sections of a cone (Boralugoda Fig. 2.8).",
         10,
         "--quantity acceleration --at t=0.5",
         ("straight_line",),

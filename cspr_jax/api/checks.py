@@ -1,4 +1,4 @@
-"""Checks of motions from Python: is a motion within the limits of a robot, at every instant, and if not, where?"""
+"""Checks of motions from Python: is a motion within the limits of a robot, at every time, and if not, where?"""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class Check(Displayed):
 
     @property
     def demands(self) -> dict[str, dict[str, Any]]:
-        """Largest demand on each limit: value, proved bound, what is allowed, cable and instant."""
+        """Largest demand on each limit: value, proved bound, what is allowed, cable and time."""
         return self._object["demands"]
 
     @cached_property
@@ -168,7 +168,7 @@ class Stretched(NamedTuple):
 
     Fields:
         factor: by which its duration grew; 1: it was feasible; NaN: no stretching is feasible.
-        is_static: whether the robot can stand still at every place of the motion, so that some stretching is feasible.
+        is_static: whether the robot can rest at every position of the motion, so that some stretching is feasible.
         check: check of the stretched motion, or None.
     """
 
@@ -217,7 +217,7 @@ def check(  # noqa: PLR0913
     duration: Positive | None = None,
     limits: LimitsOrSpec = None,
 ) -> Check:
-    """Check a motion against the limits of a robot, at every instant, with a proof.
+    """Check a motion against the limits of a robot, at every time, with a proof.
 
     Args:
         robot: a robot, the name of one of the catalogue, or the path of a robot file.
@@ -292,7 +292,7 @@ def check_file(
             return _check_of(plan, json_text(data))
         except TooLongError as error:
             if outputs:
-                held = f"must be absent: {motion} is too long to be held, and judged in windows"
+                held = f"must be absent: {motion} is too long to be held, and checked in windows"
                 raise ConfigError(outputs[0], held) from error
             return _shown(long_plan(plan, motion), json_text(data))
         except ConfigError as error:

@@ -26,7 +26,7 @@ from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.verification.attained import with_attained
-from cspr_jax.verification.proved_answers import answers_of, judge_all_robots, proofs_of
+from cspr_jax.verification.proved_answers import answers_of, proofs_of, verify_all_robots
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,7 +116,7 @@ def check_many(
         batch, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
         proofs = proofs_of(problem, batch.bounds, batch.durations, scene, batch.jumps)
         answers = with_attained(problem, answers_of(proofs, batch.durations), motions, scene)
-        judge_all_robots(problem, answers, motions, scene)
+        verify_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}
     causes = [answers.causes_of(i, axes) for i in range(count)]

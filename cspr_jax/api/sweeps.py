@@ -112,7 +112,7 @@ class Job:
         return engine.Run(self.sweep, self.directory, self.options, self.hooks)
 
     def finished(self) -> Path | None:
-        """Path of the result if it exists and is whole; jax is not needed.
+        """Path of the result if it exists and is complete; jax is not needed.
 
         Returns:
             the path, or None.
@@ -201,7 +201,7 @@ def run(
         on_tile: called after each tile with the numbers of finished and of all cells.
 
     Returns:
-        the path of the result; of the directory, where only some tiles were tile_range for.
+        the path of the result; of the directory, where only some tiles were asked for.
 
     Raises:
         ConfigError: a mistake in the sweep, or too little space on the disk.
@@ -300,7 +300,7 @@ def verify(path: str | Path) -> dict[str, Any]:
         path: a run directory, or a file.
 
     Returns:
-        what `cspr verify --json` prints: counts, and "faults", one line each; none if everything is whole.
+        what `cspr verify --json` prints: counts, and "faults", one line each; none if nothing is damaged.
 
     Raises:
         StoreError: the path is neither a run directory nor a file.
@@ -316,10 +316,10 @@ def workspace_volume(result: ResultOrPath) -> WorkspaceVolume:
         result: result of a map with verdicts: its file, or a value of `open_result` or `compute_sweep`.
 
     Returns:
-        the volume; its arrays run over the axes that are not coordinates of places, () if there are none.
+        the volume; its arrays run over the axes that are not coordinates of positions, () if there are none.
 
     Raises:
-        InputError: the result is no map, has no stored verdicts, or has a single place.
+        InputError: the result is no map, has no stored verdicts, or has a single position.
         StoreError: the file is no result.
     """
     if isinstance(result, Result):

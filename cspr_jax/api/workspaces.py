@@ -124,7 +124,7 @@ def _check_kind(robot) -> None:
 
 
 def _limits(robot, tension_min, tension_max) -> Limits:
-    if tension_max is not None and np.ndim(tension_max) == 0:  # of an infinite one each cable has its own
+    if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be one number for each cable
         allowed = f"a number > 0, or {robot.n_cables}: one a cable"
         tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
@@ -148,11 +148,11 @@ def _poses(
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivity:
-    """Sensitivities of a robot to errors of its cable lengths at n places, Machines 11 (2), 2023, 224, (7).
+    """Sensitivities of a robot to errors of its cable lengths at n positions, Machines 11 (2), 2023, 224, (7).
 
     Fields:
         positions: (n, 3) positions as they were given, in the robot's axes, m.
-        sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular place.
+        sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular pose.
         sigma_r: (n,) largest rotation of a platform over the largest error, rad/m, with six independent errors; NaN for
             a point mass.
     """
@@ -242,7 +242,7 @@ def encoder_error(drum_radius: Positive, pulses: Positive) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class AvailableAccelerations:
-    """Accelerations that the cables of a point mass can give at n places, as faces; float64.
+    """Accelerations that the cables of a point mass can give at n positions, as faces; float64.
 
     An acceleration a is feasible where `normals @ a >= offsets`.
 
@@ -269,7 +269,7 @@ class AvailableAccelerations:
         """Distance of accelerations from the nearest face.
 
         Args:
-            accelerations: (3,) for all places, or (n, 3), one per place, in the robot's axes, m/s^2.
+            accelerations: (3,) for all positions, or (n, 3), one for each, in the robot's axes, m/s^2.
 
         Returns:
             (n,) m/s^2: positive where the acceleration is feasible, inf where nothing bounds it; negative where it is
@@ -318,12 +318,12 @@ def available_accelerations(
 
     Args:
         robot: a point mass in space or in a plane.
-        positions: (n, 3) places in the robot's axes, m.
+        positions: (n, 3) in the robot's axes, m.
         tension_min: smallest tension, () or (n_cables,) N; None: the robot's, else 0.
         tension_max: largest tension, () or (n_cables,) N; None: the robot's, else none.
 
     Returns:
-        the set of feasible accelerations at each place.
+        the set of feasible accelerations at each position.
 
     Raises:
         InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, tensions that

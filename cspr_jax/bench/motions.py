@@ -19,7 +19,7 @@ from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 
 DURATION, WAYPOINTS = 10.0, 7  # s; way-points of a motion
-ROWS, TOGETHER = 10_001, 100  # of a record; motions that are judged together
+ROWS, TOGETHER = 10_001, 100  # of a record; motions that are proved together
 
 
 class Region(NamedTuple):
@@ -64,7 +64,7 @@ def _motion(region: Region, rng: np.random.Generator) -> Spline:
 
 
 def _decided(proofs: list[MotionProof]) -> None:
-    # A rate counts nothing that is left open.
+    # Only motions that are decided count.
     if any(not proof.is_feasible and not proof.broken.any() for proof in proofs):
         raise SelfCheckError("a motion of the bench is neither proved nor refuted")
 
@@ -78,7 +78,7 @@ def record_rate() -> float:
 
 
 def together_rate() -> float:
-    """Motions of eight cables that are judged a second, `TOGETHER` at once."""
+    """Motions of eight cables that are proved a second, `TOGETHER` at once."""
     case, rng = problem(EIGHT), np.random.default_rng(0)
     splines = SplineBatch([_motion(EIGHT, rng) for _ in range(TOGETHER)])
     prove = partial(proofs_of, case, splines.bounds, splines.durations, jumps=splines.jumps)

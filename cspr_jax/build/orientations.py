@@ -15,7 +15,7 @@ from cspr_jax.numerics.tolerances import UNIT_NORM
 def orientations(
     frame: Frame, points: Float[np.ndarray, "n 3"], angles: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 4"]:
-    """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes."""
+    """Orientations of tilt and torsion in the cylindrical frame of their positions, (3.98), in the kernels' axes."""
     return frame.rotated_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.rotated(points))))
 
 

@@ -147,5 +147,5 @@ def error_at_rest(robot_file: RobotFile) -> str | None:
 
 
 def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
-    """Tell whether a robot is judged by margins of tensions, for which largest tensions may be infinite."""
+    """Tell whether margins of tensions decide about a robot, for which largest tensions may be infinite."""
     return isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof

@@ -23,7 +23,7 @@ EPILOGUE = (
     "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run the command again to resume"
 )
 
-# Environment variable of a command that has begun anew once.
+# Environment variable of a command that has started itself again in a new process.
 ANEW = "CSPR_BEGUN_ANEW"
 # Set only in a process that is ours: Python's passes over the many objects of jax take a tenth of a command's time.
 FEWER_COLLECTIONS = (200_000, 20, 50)

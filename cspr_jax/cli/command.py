@@ -62,7 +62,7 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Name standard output in the error if it takes nothing more."""
+    """Name standard output in the error if it cannot be written."""
     try:
         yield
     except BrokenPipeError:
@@ -99,6 +99,6 @@ def print_path(path: Path | str) -> None:
 
 
 def warn(line: object) -> None:
-    """Write a warning to standard error; if that takes nothing more, drop the warning."""
+    """Write a warning to standard error; drop it if that fails."""
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(f"cspr: {printable(line)}\n")

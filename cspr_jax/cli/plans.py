@@ -144,7 +144,7 @@ def _plan(options: argparse.Namespace) -> int:
     plan = _planned(options)
     if options.retime:
         plan = retimed(plan, settings)
-    # Files are what took long: no table that cannot be printed stands before them.
+    # Files come first, since they took long: printing a table may fail.
     try:
         write_files(plan, options)
     finally:

@@ -135,7 +135,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     @property
     def resulting_poses(self) -> tuple[int, ...]:
-        """Numbers of the poses whose places follow from what else the plan asks: a launch, or files."""
+        """Indices of the poses whose positions follow from a launch, a file, an ellipse or a path."""
         launched = () if self.launch is None else (self.launch.segment + 1,)
         ends = [i for i, pose in enumerate(self.pose) if pose.motion is not None]
         # The first pose of a leg that begins with a file lies where the file begins.
@@ -156,7 +156,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     @property
     def is_one_path(self) -> bool:
-        """Tell whether the plan is one path, which has places of its own, in place of poses."""
+        """Tell whether the plan is one path, which has points of its own in place of poses."""
         return self.path is not None and self.path.is_whole
 
     def _is_on_ellipse(self, i: int) -> bool:

@@ -195,7 +195,7 @@ def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> Non
 
 
 def plain_values(value: Any, depth: int = DEEPEST) -> Any:
-    """A value as parsed TOML has it, of a dictionary that may hold NumPy's numbers and arrays too."""
+    """A value as parsed TOML would have it, from one that may hold NumPy's numbers and arrays."""
     if not depth:
         raise InputError(
             "given", None, f"must be nested at most {DEEPEST} deep", problem="nested too deep, or in itself"

@@ -86,9 +86,9 @@ class Axes(Table):
     torsion: Axis | None = Field(None, description="poses, workspace: angle sigma of tilt and torsion, rad; absent: 0")
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
-    tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
+    tau: Axis | None = Field(None, description="normalised times of transition-envelopes, in [0, 1]")
     cable: Axis | None = Field(
-        None, description="cables of transition-envelopes, from 1 on; absent: the worst cable at each instant"
+        None, description="cables of transition-envelopes, from 1 on; absent: the worst cable at each time"
     )
     frequency: Axis | None = Field(
         None, description="ellipse: frequencies of verdicts and margins, rad/s; all > 0; absent: ellipse.frequency"
@@ -117,7 +117,7 @@ class From(Table):
 
     @property
     def is_pose(self) -> bool:
-        """Tell whether the table says more than a place."""
+        """Tell whether the table says more than a position."""
         return any(key is not None for key in (self.tilt_torsion, self.quaternion, self.beta_hat))
 
     @model_validator(mode="after")
@@ -151,7 +151,7 @@ class SweepTrajectory(TrajectoryKeys):
 
 
 class Orientations(Table):
-    """Orientations of each place."""
+    """Orientations at each position."""
 
     definition: Literal["grid", "scan", "equal-volume"] | None = Field(
         None,
@@ -173,7 +173,7 @@ class RunTable(Table):
     """Settings of the computation, and the quantities to keep."""
 
     dtype: Literal["float64", "float32"] = Field(
-        "float64", description="type of stored numbers and of the sieve; verdicts use float64 either way"
+        "float64", description="type of stored numbers and of the screen; verdicts use float64 either way"
     )
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="shape of a tile, the block of cells computed at a time, one number per axis")
@@ -191,7 +191,7 @@ class RunTable(Table):
 
 
 class _SweepKeys(Table):
-    # Keys of a sweep but those of its surroundings, which are written behind them.
+    # Keys of a sweep except those of obstacles, which the reference lists after these.
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")

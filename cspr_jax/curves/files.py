@@ -73,7 +73,7 @@ def source_spline(
 
 
 def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
-    """A motion that a robot of a pattern can follow, without the rounding of what it cannot."""
+    """A motion that a robot of a pattern can follow; coordinates that must not move lose their rounding errors."""
     row, position = PATTERNS[pattern], np.array(spline.position)
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
     if is_planar and not row.is_planar:
@@ -124,7 +124,7 @@ def moving_ends(source: Any, ends: str | None) -> list[str]:
 def placed_inward(
     spline: Spline, frame: Frame, reference: Float[np.ndarray, "4"], centre: Float[np.ndarray, "3"] | None = None
 ) -> Spline:
-    """A spline in the axes of a robot file, in those of the kernels."""
+    """A spline brought from the axes of a robot file to those of the kernels."""
     turning = spline.quaternion
     if turning is not None:
         units = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)

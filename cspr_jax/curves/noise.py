@@ -35,7 +35,7 @@ class Noise:
 
     Fields:
         deviation: standard deviation, in the unit of the samples.
-        bending: of their second derivatives that come of it, per s^2.
+        bending: standard deviation of their second derivatives due to it, per s^2.
         jump: median jump of the second derivative of the spline through the samples, per s^2.
         step: to which the samples are rounded, if that is the noise; 0: it is not.
     """
@@ -66,8 +66,8 @@ def noise_notes(table: MotionTable, *, radius: float = 1.0) -> list[str]:
 def noise_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"], *, arm: float = 1.0) -> Noise | None:
     """Noise of samples, if it spoils their second derivatives.
 
-    Differences of a high order vanish along smooth motions, but not in noise; so of several orders, the one with the
-    least median says most.
+    Differences of a high order vanish along smooth motions, but not in noise; so the order with the smallest median
+    shows the noise alone.
     """
     is_later = np.append(True, np.diff(times) > 0.0)
     times, values = times[is_later], values[is_later]
@@ -104,7 +104,7 @@ def _calm(times: np.ndarray, values: np.ndarray, step: float, deviation: float) 
 
 
 def _deviation(times: np.ndarray, values: np.ndarray) -> float:
-    # Standard deviation of noise in a short window, by divided differences of the order that says most.
+    # Standard deviation of noise in a short window, by divided differences of the order with the smallest median.
     estimates = []
     for order in ORDERS:
         if len(times) < 3 * order:
@@ -131,8 +131,8 @@ def _rounding(values: np.ndarray) -> float:
 
 
 def _is_rounded(values: np.ndarray, step: float) -> bool:
-    # Third differences of rounded samples are often one step. Those of coordinates that lie on a grid by design are 0,
-    # or where an acceleration jumps two steps at least, since the position is half of it by the time squared.
+    # Third differences of rounded samples are often one step. Those of coordinates that lie on a grid by design are 0;
+    # where the acceleration jumps by a, they are a t^2, which is two steps at least, since a t^2 / 2 is on the grid.
     differences = np.round(np.abs(np.diff(values, 3, axis=0)) / step)
     changes = differences[differences > 0.0]
     return len(changes) > 0 and bool(np.mean(changes == 1.0) >= ONE_STEP)

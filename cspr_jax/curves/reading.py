@@ -153,12 +153,12 @@ def _of_rates(table: MotionTable) -> Spline:
     knots, quaternion = since[np.append(True, np.diff(since) > 0.0)], None
     if table.quaternions is not None and table.angular_velocities is not None:
         units = continuous(table.quaternions)
-        spins = [_pure(table.angular_velocities)]
-        spins += [] if table.angular_accelerations is None else [_pure(table.angular_accelerations)]
-        first = 0.5 * rotations.products(spins[0], units)
+        turns = [_pure(table.angular_velocities)]
+        turns += [] if table.angular_accelerations is None else [_pure(table.angular_accelerations)]
+        first = 0.5 * rotations.products(turns[0], units)
         turning = [units, first]
-        if len(spins) == 2:
-            turning.append(0.5 * (rotations.products(spins[1], units) + rotations.products(spins[0], first)))
+        if len(turns) == 2:
+            turning.append(0.5 * (rotations.products(turns[1], units) + rotations.products(turns[0], first)))
         quaternion = hermite(since, turning)
     elif table.quaternions is not None:
         plain = _without_joins(table)

@@ -17,13 +17,13 @@ from cspr_jax.curves.noise import deviation_of
 from cspr_jax.errors import InputError
 
 MIN_SAMPLES = 5
-LOWEST = -8.0  # power of ten of the weight of the second derivative, in steps, with which curves pass through samples
+LOWEST = -8.0  # power of ten of the weight of the second derivative (time in steps) at which curves meet all samples
 HIGHEST = 24.0
 STEPS = 4.0  # of the power, in which an upper bound is sought
 POWER_ERROR = 1e-4  # of the power
 REFINEMENTS = 3  # of solutions, whose matrices are badly conditioned where weights are large
-# An end moves if a polynomial at rest there misses samples so many times more, squared, than one that is not, and if
-# rest takes so many times the second derivatives, squared.
+# An end moves if, compared with a polynomial that moves there, one at rest has so many times the sum of squared errors,
+# and a curve at rest so many times the sum of squared second derivatives.
 FACTOR = 2.0
 COSTS = 1.03
 SURE = 4.0  # standard deviations of the noise that the first factor needs

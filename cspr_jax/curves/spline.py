@@ -37,8 +37,7 @@ class Spline:
     Fields:
         knots: (m + 1,) times between the m pieces, the first 0, increasing; s.
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
-        quaternion: (m, degree + 1, 4) likewise, scalar first, continuous; their length is of no account, but not zero;
-            None for a point mass.
+        quaternion: (m, degree + 1, 4) likewise, scalar first, continuous, of any length but 0; None for a point mass.
         z0: () depth at which slacks are normalised, m.
         offset: (3,) from the point whose positions these are to the mass centre, platform axes, m; None: it is that.
         interpolation: how its samples were joined, one of `curves.interpolation.INTERPOLATIONS`, or "pieces".
@@ -68,7 +67,7 @@ class Spline:
         return piece_state(jnp.asarray(self.position)[piece], quaternion, fraction, width, self.offset)
 
     def padded(self) -> "Spline":
-        """The same motion of a usual number of pieces: the first one is repeated at its start, without a duration."""
+        """The same motion, its number of pieces rounded up: the first is repeated at its start, without a duration."""
         count = len(self.knots) - 1
         more = next((usual - count for usual in USUAL if usual >= count), 0)
         if more == 0:
@@ -119,11 +118,11 @@ def moved(bounds: StateBounds, offset: Float[Array, "3"]) -> StateBounds:
 
     def one(state: StateBounds) -> StateBounds:
         arm = rotated(state.rotation, offset)
-        swing = cross(state.angular_velocity, arm)
-        relative = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, swing)
+        turning = cross(state.angular_velocity, arm)
+        relative = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, turning)
         return state._replace(
             position=state.position + arm,
-            velocity=state.velocity + swing,
+            velocity=state.velocity + turning,
             acceleration=state.acceleration + relative,
         )
 
@@ -140,7 +139,7 @@ def part(spline: Spline, first: int, last: int) -> Spline:
 
 
 def chained(splines: Sequence[Spline]) -> Spline:
-    """Splines one behind another, as one motion."""
+    """Consecutive splines as one motion."""
     ends = np.concatenate([[0.0], np.cumsum([spline.knots[-1] for spline in splines])])
     knots = [spline.knots[:-1] + start for spline, start in zip(splines, ends[:-1], strict=True)]
     tables: dict[str, Any] = {
@@ -162,13 +161,13 @@ def piece_state(
     point, velocity, acceleration = piece_values(position, fraction, width)
     if quaternion is None:
         return State(point, velocity, acceleration)
-    rotation, spin, spin_rate, unit = turning_of(*piece_values(quaternion, fraction, width))
+    rotation, angular_velocity, angular_acceleration, unit = turning_of(*piece_values(quaternion, fraction, width))
     if offset is not None:
         arm = rotation @ offset
-        swing = jnp.cross(spin, arm)
-        point, velocity = point + arm, velocity + swing
-        acceleration = acceleration + jnp.cross(spin_rate, arm) + jnp.cross(spin, swing)
-    return State(point, velocity, acceleration, rotation, spin, spin_rate, unit)
+        turning = jnp.cross(angular_velocity, arm)
+        point, velocity = point + arm, velocity + turning
+        acceleration = acceleration + jnp.cross(angular_acceleration, arm) + jnp.cross(angular_velocity, turning)
+    return State(point, velocity, acceleration, rotation, angular_velocity, angular_acceleration, unit)
 
 
 def piece_values(

@@ -29,7 +29,7 @@ class CsprError(Exception):
         return "\n".join(map(str, self.args))
 
     def __reduce__(self) -> tuple:
-        """Errors come whole out of worker processes, whatever their constructor takes."""
+        """Let worker processes pass errors on, whatever arguments their constructors take."""
         return _rebuilt, (type(self), self.args, self.__dict__)
 
 
@@ -57,15 +57,15 @@ class InputError(CsprError, ValueError):
 
 
 class ConfigError(CsprError):
-    """A fault in a file: names the file, the key, the value and what is allowed.
+    """A mistake in a file: names the file, the key, the value and what is allowed.
 
     Args:
         message: the rest of the line.
-        others: further faults of the file, each the rest of a line of its own; the error's text only counts them.
+        others: further mistakes in the file, each the rest of a line of its own; the error's text only counts them.
         count: how many others there are, where not all are given.
 
     Fields:
-        lines: one for each fault.
+        lines: one for each mistake.
     """
 
     exit_code = ExitCode.BAD_INPUT

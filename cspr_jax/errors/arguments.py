@@ -39,7 +39,7 @@ class Integer:
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """Rule of some types, or of a further one, which has some attributes and need not be imported for this."""
+    """Rule of some types; also of objects with some attributes, whose type need not be imported for this check."""
 
     allowed: str
     kinds: tuple[type, ...] = ()
@@ -55,7 +55,7 @@ class Kind:
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """Rule that lets some strings, or None, pass besides."""
+    """Another rule, and besides some strings or None that are let pass."""
 
     rule: Rule
     others: tuple[str | None, ...]
@@ -153,7 +153,7 @@ NUMBER = Numbers("a number", infinite=True, nan=True)
 Positive = Annotated[float, Numbers("a finite number > 0", positive=True)]
 Length = Annotated[float, Numbers("a number > 0, in m", positive=True)]
 Diameter = Annotated[float, Numbers("a number >= 0, in m", minimum=0.0)]
-CableErrors = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one a place", ((), (ANY,)), minimum=0.0)]
+CableErrors = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one a position", ((), (ANY,)), minimum=0.0)]
 Acceleration = Annotated[float, Numbers("a number >= 0, in m/s^2", minimum=0.0)]
 RampTime = Annotated[float, Numbers("a finite number >= 0, s", minimum=0.0)]
 Phase = Annotated[ArrayLike, Numbers("a finite number, rad", traced=True)]
@@ -169,7 +169,7 @@ Durations = Annotated[ArrayLike, Numbers("finite numbers > 0 of shape (n,), s", 
 
 def times(allowed: str, *shapes: tuple[int | None, ...]) -> Numbers:
     """Rule of times, whose powers must not overflow."""
-    words = f"instants {allowed}, at most {LARGEST_TIME:.0e} s"
+    words = f"times {allowed}, at most {LARGEST_TIME:.0e} s"
     return Numbers(words, shapes, minimum=-LARGEST_TIME, maximum=LARGEST_TIME)
 
 

@@ -13,7 +13,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.numerics.shapes import Float
 
-# A point of release counts as on a parabola that it misses by less than this part of its distance from the target.
+# Distance of a point of release from the parabola, over its distance from the target, up to which it lies on it.
 ON_PARABOLA = 1e-6
 
 

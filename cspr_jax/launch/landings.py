@@ -172,7 +172,7 @@ def _derivatives(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
     """Scatter of the landings of a launch."""
     count, random = robot.n_cables, np.random.default_rng(errors.seed)
-    # Errors are drawn in this order, so that a sample of one kind of error is that of a larger one, scaled.
+    # Standard errors are drawn and then scaled, always all of them: larger errors of one kind scale the same sample.
     release = random.normal(size=(errors.throws, 1)) * errors.release
     lengths = random.normal(size=(errors.throws, count)) * errors.cable_length
     rates = random.normal(size=(errors.throws, count)) * errors.cable_speed

@@ -36,7 +36,7 @@ class GridMap(abc.ABC):
 
     Fields:
         any_cables: whether the robot may have more cables than degrees of freedom.
-        proves: whether the verdicts of its motions are proofs, except those that say otherwise.
+        proves: whether verdicts of its motions are proved, unless they say that they are not.
 
     Raises:
         ConfigError: the robot, the amplitude function or the limits cannot be used.
@@ -108,8 +108,8 @@ class GridMap(abc.ABC):
         return self._frame.inward(np.stack(columns, axis=1))
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        # Return cells among which depths and heights have their extremes. Among azimuths the one down the slope of the
-        # spool plane stands for all: no other target is deeper below it.
+        # Return cells among which depths and heights have their extremes. Of all azimuths take the one in which the
+        # spool plane descends most: no other target is deeper below it.
         derivative = self._frame.rotated(plane_normal(self._problem.robot))
         axes = {
             name: np.array([points.min(), points.max()])
@@ -123,7 +123,7 @@ class GridMap(abc.ABC):
 
     @property
     def _missed(self) -> float:
-        # By how much slacks of limits may be below zero where limits are touched: of tensions over the weight a cable,
+        # By how much slacks of limits may be below zero where limits are touched: of tensions over weight / n_cables,
         # of depths over z0, at least a tenth of the robot's size.
         limits, weight = self._problem.limits, self._weight
         tensions = np.ravel([x for x in (limits.tension_min, limits.tension_max) if x is not None])
@@ -210,6 +210,6 @@ class PointMassMap(GridMap):
 
 
 def exceeds(bound: Float[np.ndarray, "n"], margin: Float[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
-    """Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf."""
+    """Tell where a bound exceeds its margin by more than rounding; cables that span too little have the margin -inf."""
     with np.errstate(invalid="ignore"):
         return bound > margin + CHECK_ERROR * (1.0 + np.abs(margin))

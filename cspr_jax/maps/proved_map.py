@@ -1,4 +1,4 @@
-"""Base of maps of proved motions of any robot from given places, with one orientation."""
+"""Base of maps of proved motions of any robot from given positions, with one orientation."""
 
 import functools
 import operator
@@ -11,14 +11,14 @@ from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.maps.from_places import check_place
+from cspr_jax.maps.from_positions import check_start
 from cspr_jax.maps.grid_map import CHECK_ERROR, GridMap, exceeds
 from cspr_jax.motion.answers import Answers
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.criteria import FLAGS, judged_poses
+from cspr_jax.verification.criteria import FLAGS, pose_conditions
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
 # Flags that say something of a motion beside its contacts.
@@ -27,7 +27,7 @@ _COLUMNS = {"tension_margin": "margin", "tension_margin_bound": "margin_bound"}
 
 
 class ProvedMap(GridMap):
-    """The map of proved motions from one place to each target; see `GridMap`.
+    """The map of proved motions from one position to each target; see `GridMap`.
 
     Fields:
         from_rest: whether the start may be at rest in P0.
@@ -38,9 +38,9 @@ class ProvedMap(GridMap):
     from_rest: ClassVar[bool] = False
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
-        """Refuse robots that go along no path, and starts without a place."""
+        """Refuse robots that no path moves, and starts without a position."""
         super().__init__(robot_file, spec, file)
-        check_place(robot_file, spec, file, rests=self.from_rest)
+        check_start(robot_file, spec, file, rests=self.from_rest)
         if robot_file.own_pattern == "1T" or PATTERNS[robot_file.own_pattern].is_jointed:
             allowed = "must be one that moves in space or in a plane in this map"
             raise ConfigError(file, f'robot "{robot_file.name}" is {robot_file.kind}: {allowed}')
@@ -61,7 +61,7 @@ class ProvedMap(GridMap):
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
-        if judged_poses(self._problem.robot)[1]:
+        if pose_conditions(self._problem.robot)[1]:
             super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

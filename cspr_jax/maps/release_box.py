@@ -1,4 +1,4 @@
-"""Places within which maps of launches look for a release."""
+"""Box within which maps of launches look for a release."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,14 +9,14 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, spool_radius
 
-# Reach over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
+# Half width and depth of the box over the radius of the spools, from the vertical through their centroid, and down.
 ASIDE, DEEP = 2.0, 4.0
 
 Range = Sequence[float] | None
 
 
 class ReleaseBox(NamedTuple):
-    """Bounds of places of release, from the centroid of the spools, z down.
+    """Bounds of the position of release, from the centroid of the spools, z down.
 
     Fields:
         low: (3,) m.
@@ -28,7 +28,7 @@ class ReleaseBox(NamedTuple):
 
 
 def box_of(robot: PointMassRobot, frame: Frame, releases: Sequence[Range] = (None, None, None)) -> ReleaseBox:
-    """Bounds of places of release."""
+    """Bounds of the position of release."""
     radius = float(spool_radius(robot))
     aside = 0.0 if robot.dof == PLANAR else ASIDE * radius
     corners = frame.outward([[-ASIDE * radius, -aside, 0.0], [ASIDE * radius, aside, DEEP * radius]])

@@ -1,4 +1,4 @@
-"""Columns that launches to many landing places share, by whatever motion the object is released."""
+"""Columns that launches to many landing points share, by whatever motion the object is released."""
 
 import dataclasses
 from typing import Self
@@ -11,14 +11,14 @@ from cspr_jax.schema.columns import Columns
 
 @dataclasses.dataclass(frozen=True)
 class Releases(Columns):
-    """Slowest releases to n landing places, (n,) each; NaN where there is none, but for the first two.
+    """Slowest releases to n landing points, (n,) each; NaN where there is none, except for the first two.
 
     Fields:
         verdict: flags of `Verdict`: 0 where a launch was found.
         largest_margin: largest margin of the motions that were tried.
         release_speed: m/s.
         flight_time: s.
-        release_x: of the place of the release, m.
+        release_x: of the position of the release, m.
         release_y: likewise.
         release_z: likewise.
     """
@@ -33,15 +33,15 @@ class Releases(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether a launch to each place was found, (n,); its motion is feasible."""
+        """Tell whether a launch to each point was found, (n,); its motion is feasible."""
         return self.verdict == 0
 
     @property
     def releases(self) -> np.ndarray:
-        """Places of the releases, (n, 3) m."""
+        """Positions of the releases, (n, 3) m."""
         return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
 
     def placed(self, frame: Frame) -> Self:
-        """The same, with the places of the releases in other axes."""
+        """The same, with the positions of the releases in other axes."""
         x, y, z = frame.outward(self.releases).T
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)

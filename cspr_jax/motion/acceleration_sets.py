@@ -123,7 +123,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
     tolerance = BOUNDARY * (1.0 + jnp.linalg.norm(points, axis=1))
     inside = counts & (points @ normal.T - offset[None] >= -tolerance[:, None]).all(1)
-    # The section is unbounded if one can go along the edge of a face without end.
+    # The section is unbounded if an edge of a face has no end in it.
     if planar:
         along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
     else:

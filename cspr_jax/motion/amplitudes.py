@@ -29,7 +29,7 @@ SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
 # Tables have at least this many columns, so that few shapes have to be compiled; zeros change no bit.
 COLUMNS = 6
-# Coefficients below this part of the largest one do not change where a function is stationary.
+# Coefficients below this fraction of the largest one are negligible in the search for stationary points.
 NEGLIGIBLE = 1e-100
 
 
@@ -117,8 +117,8 @@ def from_pieces(
 
 
 def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
-    # Finding roots divides by the highest coefficient, which overflows for one that is as good as zero; such a
-    # coefficient only adds roots far away.
+    # Finding roots divides by the highest coefficient, and overflows where it is negligible; such a coefficient only
+    # adds roots far away.
     derivative = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
     stationary = derivative.roots() if derivative.degree() > 0 else np.zeros(0)
     # A double root may come out as a close complex pair: its real part is near enough to evaluate.

@@ -7,8 +7,7 @@ from typing import Any
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
-# Digits that a number has at least, and at most where fewer do not tell it from another one.
-DIGITS, MOST_DIGITS = 3, 12
+DIGITS, MOST_DIGITS = 3, 12  # of a number: at least, and at most, if fewer do not tell it from another one
 ON_PLANE = 1e-9  # m; a height above the spools that says nothing
 # By flag: what the motion does, in words; {cable} is "cable 1", or "cables 1 and 3".
 _WORDS = {

@@ -74,11 +74,11 @@ def check_bounded(limits: Limits) -> None:
 
 
 def check_of_motion(limits: Limits) -> None:
-    """Refuse limits of the mass centre's motion where none is judged."""
+    """Refuse limits of the mass centre's motion where none is checked."""
     for row in LIMITS:
         value = getattr(limits, row.name)
         if row.of_mass_centre and value is not None:
-            raise InputError(row.name, float(value), "absent where no motion is judged")
+            raise InputError(row.name, float(value), "absent where no motion is checked")
 
 
 def check_certain(

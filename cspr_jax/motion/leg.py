@@ -66,7 +66,7 @@ class Leg(abc.ABC):
     """
 
     step: ClassVar[int] = 0
-    point: str | None = None  # whose positions the files of the leg have, where they say it
+    point: str | None = None  # point of the platform whose positions files have, if they say so
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""

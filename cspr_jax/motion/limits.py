@@ -27,7 +27,7 @@ def limits_set(limits: Limits) -> tuple[Limit, ...]:
 
 
 def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:
-    """By how much a motion may miss a limit and keep it: a part of it, for the floor of the radius of the spools."""
+    """By how much a motion may miss a limit: a fraction of the limit; for the floor, of the radius of the spools."""
     return TOUCHED * (np.asarray(spool_radius(robot)) if row.is_height else limit)
 
 

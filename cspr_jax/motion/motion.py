@@ -27,7 +27,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # States that are computed at once.
 STATES = 64
-# Distance of the earlier side of a joint from it, over the time.
+# Distance in time of a sample just before a joint of pieces, over that time.
 BESIDE = 4.0 * np.finfo(float).eps
 
 jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])

@@ -48,8 +48,8 @@ class Peaks:
         mass_centre_acceleration: likewise, m/s^2.
         tension_margin: smallest distance of tensions from their limits, of redundant cables the largest that all can
             keep, N.
-        are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
-        samples: number of instants at which the motion was sampled.
+        are_found: whether the rule of redundant cables found tensions within their limits at all times; 1 or 0.
+        samples: number of times at which the motion was sampled.
         when: when each of the extremes above is attained, (n, n_extremes), s.
         cables: which cable attains it, from 0 on; -1: none.
     """
@@ -96,14 +96,14 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
         force = central = cables.tensions(robot, state)
         are_found = jnp.asarray(1.0)
     smallest, largest = tension_range(robot, limits)
-    length, rate, rate_slope = cables.cable_motion(robot, state)
+    length, rate, rate_derivative = cables.cable_motion(robot, state)
     of_cables = {
         "tension_min": force,
         "tension_max": -force,
         "mu_min": force / length / robot.mass,
         "length_max": -length,
         "speed_max": -jnp.abs(rate),
-        "acceleration_max": -jnp.abs(rate_slope),
+        "acceleration_max": -jnp.abs(rate_derivative),
         "tension_margin": jnp.minimum(central - smallest, largest - central),
     }
     extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
@@ -133,8 +133,8 @@ def peaks(
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
-        # Motions of one structure and one number of samples are computed together, but for those that may have very
-        # many pieces, which would be copied for each instant.
+        # Motions of one structure and one number of samples are computed together, except those that may have very
+        # many pieces, which would be copied for each sample.
         group = i if has_pieces(motion) else None
         shapes = tuple(np.shape(array) for array in jax.tree.leaves(motion))
         alike.setdefault((group, jax.tree.structure(motion), shapes, len(tau)), []).append(i)

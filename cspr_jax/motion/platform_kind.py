@@ -8,7 +8,7 @@ class PlatformMotionKind(NamedTuple):
 
     Fields:
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
-        plain: whether orientations beat with beta_1 of (3.66), whatever beta-hat is, or with beta_ff of (3.93).
+        plain: whether the time function of rotations is beta_1 of (3.66), whatever beta-hat is, or beta_ff of (3.93).
         from_rest: whether all segments start at rest in P0.
     """
 

@@ -1,13 +1,13 @@
-"""Slacks of any motion: numbers that are positive exactly while a criterion is met, from the state of one instant.
+"""Slacks of any motion: numbers that are positive exactly while a criterion is met, from the state at one time.
 
 They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. In this
 order, with n the number of cables, kappa_k the tension of cable k over its length, and values at rest in P0 below:
 
-    taut       kappa_k over its value at rest, of a point mass without pulleys with the pseudotension; of a platform
-               n z0 mu_k / g
+    taut       kappa_k over its value at rest; for a point mass without pulleys, the pseudotension over its value at
+               rest; for a platform, n z0 mu_k / g
     regular    of a platform: normalised determinant of the structure matrix over its value at rest
     below      depth of the mass centre below the spool plane over z0
-    limits     of each limit that is set, one slack for each cable, of the floor one: `motion.limits.slack`
+    limits     for each limit that is set, one slack per cable, and one for the floor: `motion.limits.slack`
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 
 def slacks(problem: Problem, motion: Motion, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
-    """Slacks of all criteria at one instant of a motion."""
+    """Slacks of all criteria at one time of a motion."""
     robot, state, z0 = problem.robot, motion.state(tau), motion.z0
     balance = _of_platform if isinstance(robot, PlatformRobot) else _of_point_mass
     terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
@@ -68,14 +68,14 @@ def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array
 def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
     center = rest_point(z0)
     at_rest = wrench_balance.normalised_determinant(robot, center, jnp.eye(3))
-    current = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
+    determinant = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
     with_pulleys = robot.pulleys is not None
     per_length = _per_length(robot, state) if with_pulleys else wrench_balance.tensions_per_length(robot, state)
-    return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(current / at_rest)]
+    return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(determinant / at_rest)]
 
 
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Float[Array, ""]:
-    """Smallest slack at equidistant instants of a motion."""
+    """Smallest slack at equidistant times of a motion."""
     tau = jnp.linspace(0.0, 1.0, samples + 1)
     return jnp.min(jax.vmap(lambda t: slacks(problem, motion, t))(tau))
 

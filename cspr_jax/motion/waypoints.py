@@ -26,8 +26,8 @@ class Waypoints:
         path: path of the plan, named in errors.
         frame: frame of the robot.
         family: name of the family that joins them.
-        first: number, in the plan, of the first pose.
-        last: number, in the plan, of the last pose.
+        first: index, in the plan, of the first pose.
+        last: index, in the plan, of the last pose.
         fixed: (n_segments,) numbers of arcs in place of those of the poses, -m where they are free from m on; None:
             those of the poses.
     """

@@ -14,7 +14,7 @@ from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.criteria import judged_poses
+from cspr_jax.verification.criteria import pose_conditions
 
 
 def binding(
@@ -32,7 +32,7 @@ def binding(
     table, numbers = np.concatenate(slacks, axis=1)[: len(times)], np.array(names)
     nearest = np.where(np.isnan(table), np.inf, table).argmin(1)
     flags, cables = numbers[nearest].T
-    # Rows beyond these criteria are within the intervals of failure of others.
+    # Rows at which none of these criteria fails lie in the intervals of failure of others.
     is_broken = (np.take_along_axis(table, nearest[:, None], 1) < 0.0).any(1)
     for name, intervals in (details.get("failing_by_criterion") or {}).items():
         ends = np.reshape(intervals, (-1, 2))
@@ -54,13 +54,13 @@ def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray])
         "depth": state.position[:, 2:],
         "length": of_cables["length"],
         "speed": np.abs(of_cables["rate"]),
-        "acceleration": np.abs(of_cables["rate_slope"]),
+        "acceleration": np.abs(of_cables["rate_derivative"]),
         "mass_centre_speed": np.linalg.norm(state.velocity, axis=1)[:, None],
         "mass_centre_acceleration": np.linalg.norm(state.acceleration, axis=1)[:, None],
     }
     for row in other_limits(limits):
         limit = np.asarray(getattr(limits, row.name), float)
         rows.append((row.flag, (limit - values[row.quantity]) / (radius if row.unit == "m" else limit)))
-    if judged_poses(robot)[1]:
+    if pose_conditions(robot)[1]:
         rows.append((Verdict.ABOVE_SPOOLS, (state.position @ np.asarray(plane_normal(robot)))[:, None] / radius))
     return rows

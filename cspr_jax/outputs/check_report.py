@@ -20,7 +20,7 @@ SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.
 MAX_INTERVALS = 12
 
-# Details of a motion that was run along again.
+# Details of a motion that was retimed.
 RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_deviation")
 
 
@@ -63,7 +63,7 @@ def shown_proof(plan: PlannedMotions) -> MotionProof:
 
 
 def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:
-    # The worst cable of each limit, with a bound that no instant exceeds.
+    # The worst cable of each limit, with a bound that no time exceeds.
     rows, worst = case.criteria, dict[Verdict, int]()
     for k in np.argsort(case.proof.high / case.scales).tolist():
         worst.setdefault(rows[k].flag, k)
@@ -130,7 +130,7 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; {axes_text(plan)}"]
     lines += _retimed(plan)
     if plan.feasible:
-        text = "feasible: every criterion is proved to hold at every instant"
+        text = "feasible: every criterion is proved to hold at every time"
         stands = float(answers.tolerated[0])
         return [*lines, text if math.isnan(stands) else f"{text}, and for {stands:.3g} of the uncertainty"]
     word = "undecided" if answers.verdict[0] == Verdict.UNDECIDED else "not feasible"
@@ -159,10 +159,10 @@ def _motion(plan: PlannedMotions) -> Any:
 def _taken_as(plan: PlannedMotions) -> str:
     motion = _motion(plan)
     if motion is None:
-        return f"interpolation {plan.keys.interpolation}, judged window by window"
+        return f"interpolation {plan.keys.interpolation}, checked window by window"
     if not isinstance(motion, Spline):
         proved = (
-            "with bounds of its states" if hasattr(motion, "bounds") else "sampled: nothing between instants is proved"
+            "with bounds of its states" if hasattr(motion, "bounds") else "sampled: nothing between samples is proved"
         )
         return f"{type(motion).__name__}, {proved}"
     count = len(motion.knots) - 1

@@ -11,7 +11,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder() -> Path:
-    """Folder of the examples: in the package where it was installed from a wheel, in the checkout beside it else."""
+    """Folder of the examples: in the package if it was installed from a wheel, else in the checkout beside it."""
     for path in (_PACKAGE / "examples", _PACKAGE.parent / "sweeps"):
         if path.is_dir():
             return path

@@ -1,7 +1,7 @@
 """Criteria of a checked motion that lie on their limits, as far as its samples tell.
 
-A motion that touches a limit, such as the fastest one, passes or fails between its samples by less than pieces through
-these differ from it. How much that may be is estimated from pieces through every second sample.
+A motion that touches a limit, such as the fastest one, meets or misses it between samples by less than the error of the
+interpolation through these. That error is estimated by interpolation through every second sample.
 """
 
 from pathlib import Path
@@ -18,18 +18,18 @@ from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.proved_answers import MotionProof, cause_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
-# Fraction of its scale within which the smallest slack of a criterion is compared with what samples leave open.
+# Smallest slack of a criterion over its scale up to which it is compared with the error of interpolation.
 NEAR = 1e-3
 # Samples in each piece, and pieces at most, at which motions are compared.
 SAMPLES, MAX_PIECES = 8, 256
 
 
 class TouchedLimit(NamedTuple):
-    """A criterion that a motion meets or misses by less than its samples tell.
+    """A criterion that a motion meets or misses by less than the error of its interpolation.
 
     Fields:
         cause: by how much, where and when, in words too.
-        tolerance: that its samples leave, in the unit of the cause.
+        tolerance: error of the interpolation, in the unit of the cause.
     """
 
     cause: Cause

@@ -55,7 +55,7 @@ _FIELDS = {
 LARGEST_ROWS = 20_000_000
 # Quantities that may be infinite along the way although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
-# A tick that lies so near to the end of a segment, in parts of a tick, is that end.
+# A tick nearer to the end of a segment than this, over the time between ticks, is that end.
 SAME_TICK = 1e-6
 
 
@@ -63,8 +63,8 @@ SAME_TICK = 1e-6
 def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_couples: bool):
     def one(t):
         state = motion.state(t)
-        length, rate, rate_slope = cables.cable_motion(robot, state)
-        of_cables = {"length": length, "rate": rate, "rate_slope": rate_slope}
+        length, rate, rate_derivative = cables.cable_motion(robot, state)
+        of_cables = {"length": length, "rate": rate, "rate_derivative": rate_derivative}
         if robot.n_cables > robot.dof:
             chosen = cables.shared(robot, state, limits, rule)
             of_cables |= {"tension": chosen.tensions, "tension_residual": chosen.residual}
@@ -116,7 +116,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     robot = plan.problem.robot
     is_redundant = robot.n_cables > robot.dof
-    # Other motions do not depend on limits, and which limits there are decides what is compiled.
+    # Other motions do not depend on limits: without any, plans with different limits run the same compiled code.
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and robot.pulleys is None and is_rectangle(robot.base_points)
@@ -225,7 +225,7 @@ def _write_others(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
 
 
 def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Intervals in which segments fail that are proved or refuted over their whole time."""
+    """Intervals of time that are proved to break a limit or to leave cables slack, over all segments."""
     starts = np.cumsum(plan.answers.duration) - plan.answers.duration
     intervals = [
         start + np.reshape(plan.details(i).get("failing", ()), (-1, 2)) for i, start in enumerate(starts.tolist())

@@ -7,8 +7,8 @@ import numpy as np
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Limits that a line names, at most; smaller fractions of the time than this it leaves out.
-MAX_NAMED, MIN_NAMED = 4, 0.005
+MAX_NAMED = 4  # limits in a line
+MIN_NAMED = 0.005  # fraction of the time during which a limit must bind to be named
 
 
 def path_lines(segments: list[dict[str, Any]]) -> list[str]:

@@ -14,8 +14,8 @@ LEGEND = (
 )
 # Names of JSON cells, as people read them.
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
-# A table of more columns than the first is shown so many columns at a time.
-WIDEST, SIDE_BY_SIDE = 10, 6
+WIDEST = 10  # columns of a table that are shown in one block
+SIDE_BY_SIDE = 6  # columns of each block of a table with more
 DIGIT_ERROR = 1e-9  # of a number and of half a unit of its last digit
 
 

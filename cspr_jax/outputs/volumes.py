@@ -112,7 +112,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
     def placed(name: str) -> np.ndarray:
         values = result.data[name].transpose(*others, *order)
-        # A coordinate of places that has one value here has one cell along its axis.
+        # A coordinate that has only one value has one cell along its axis.
         singles = tuple(i for i, k in enumerate(others) if names[k] in axes)
         return values.squeeze(axis=singles)
 

@@ -22,7 +22,7 @@ from cspr_jax.robots.model.robot import Robot
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.families import FAMILIES
 
-# A conservative z0 must lie above its bound: by this part of it.
+# Relative distance of a conservative z0 above its bound.
 ABOVE_BOUND = 1e-6
 EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
@@ -97,7 +97,7 @@ def _check_rest(robot: Robot, waypoints: Waypoints, z0: float) -> None:
 
 
 def nearly_resting(waypoints: Waypoints, z0: float) -> list[str]:
-    """Poses that are P0 but for their last digits."""
+    """Poses that differ from P0 only in their last digits."""
     lines = [
         almost_at_rest(f"{waypoints.name(i)}.position", pose.position, z0, waypoints.robot_file)
         for i, pose in enumerate(waypoints.poses)
@@ -143,7 +143,7 @@ def _best_inclination(problem: Problem, waypoints: Waypoints) -> float:
 
 
 def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
-    # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
+    # The duration grows with the root of z0 between changes of the arcs: search coarsely, then finely near the best.
     minimum = max(depths.least_depth(problem.robot, sequence.waypoints.targets), 1e-3)
     safe = depths.conservative_depth(problem.robot, sequence.waypoints.targets)
     trial = np.linspace(0.5 * minimum, max(1.5 * minimum, safe if np.isfinite(safe) else 0.0), DEPTHS)

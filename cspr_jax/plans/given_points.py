@@ -15,7 +15,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import frame_of
 
-# Keys of plans and poses that are of the mass centre, whatever point the positions of poses are of.
+# Keys of plans and poses that refer to the mass centre, whatever point the positions of poses are of.
 OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "acceleration")
 
 

@@ -1,4 +1,4 @@
-"""Motions of tables that are too long to be held: judged window by window, as one plan of one segment."""
+"""Motions of tables that are too long to be held: checked window by window, as one plan of one segment."""
 
 import dataclasses
 from collections.abc import Iterator

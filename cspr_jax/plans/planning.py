@@ -44,7 +44,7 @@ FROM_POINTS = (
 )
 # Value that a search for z0 takes for a "best" epsilon, until that is chosen.
 FIRST_EPSILON = 0.2
-# Positions may differ by this part of the robot's size where families change, accelerations by this part of gravity.
+# Differences of positions over the robot's radius, and of accelerations over gravity, allowed where families change.
 CONTINUOUS = 1e-9
 
 
@@ -61,7 +61,7 @@ class PlannedMotions:
         points: (n + 1, 3) in the axes of the robot file, m.
         legs: consecutive segments of one family each, n segments in all.
         demands: of the n segments; `lowest` is z in the axes of the robot file.
-        outcomes: of the legs that have one.
+        outcomes: results of the legs that have one beyond their motion.
         causes: of the n segments, why each is not feasible, the worst cause first.
         warnings: what its user should know, one line each.
         text: of the plan file; empty for a plan that has none.
@@ -126,7 +126,7 @@ class PlannedMotions:
 
     @property
     def outcome_columns(self) -> dict[str, np.ndarray]:
-        """Datasets that the outcomes of the legs add to a motion file."""
+        """Datasets that the results of the legs add to a motion file."""
         return {name: values for result in self.outcomes for name, values in result.columns().items()}
 
     @property
@@ -241,12 +241,12 @@ def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: Pla
 
 
 def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:
-    # Return the places of all poses in the axes of the robot file, also of those that the motion before them decides.
+    # Return the positions of all poses in the axes of the robot file, also of those that a motion decides.
     waypoints = sequence.waypoints
     points = np.array(waypoints.frame.outward(waypoints.points(z0)))
     motions = [motion for leg in legs for motion in leg.motions]
     for i in waypoints.plan_file.resulting_poses:
-        # The place of the first pose is where the motion begins.
+        # The first pose is where the motion begins.
         segment, end = (i - 1, 1.0) if i else (0, 0.0)
         points[i] = waypoints.frame.outward(states_at(motions[segment], np.array([end])).position[0])
     return points
@@ -299,7 +299,7 @@ def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], plan_file: PlanFile, c
 
 
 def _counts(leg: JoinedLeg, plan_file: PlanFile) -> np.ndarray:
-    # Count the instants at which a search for extremes begins.
+    # Count the times at which a search for extremes begins.
     return np.maximum(SAMPLES * leg.answers.tried_arcs, plan_file.samples) + 1
 
 

@@ -1,4 +1,4 @@
-"""Plans retimed: the same paths, each run along in the least time that all limits allow."""
+"""Plans retimed: the same paths in the least time that all limits allow."""
 
 import dataclasses
 import itertools
@@ -24,19 +24,19 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.attained import with_attained
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Part of the planned duration by which a motion is shorter at least that takes its place.
+# Gain over the planned duration that a motion must have to replace the planned one.
 LEAST_GAIN = 1e-4
-# Share of the largest path speed that is sought, above which no limit bounds the time.
+# Fraction of the largest path speed of the search, above which a motion counts as not bounded by any limit.
 UNBOUNDED = 0.5
-# Distance from the planned path above which the grid is doubled, m, and how often.
-AWAY, DOUBLINGS = 1e-6, 3
+AWAY = 1e-6  # m; distance from the planned path above which the grid is doubled
+DOUBLINGS = 3  # at most
 # Accelerations at a pose may jump by this part of gravity.
 JUMPS = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
 class RetimedAnswers(PathAnswers):
-    """Answers of segments that were run along again.
+    """Answers of segments that were retimed.
 
     Fields:
         lower_bound: (n,) of the time along each path, s; NaN where none is known, or the motion passes a pose.
@@ -139,7 +139,7 @@ def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_ti
 
 
 def _answers(plan: PlannedMotions, faster: Sequence[_Faster], proved: Answers, is_better: np.ndarray) -> RetimedAnswers:
-    # Sections are told of motions that are run along again, and bounds of all.
+    # Sections are reported for retimed motions only, bounds for all.
     count = len(is_better)
     bound, deviation = np.zeros(count), np.zeros(count)
     sections = np.empty(count, object)
@@ -179,7 +179,7 @@ def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]
 def _with_planned(
     plan: PlannedMotions, scene: Scene, answers: Answers, motions: list[Motion], rows: np.ndarray
 ) -> Answers:
-    # Answers with those of motions that stay, whose family has proved what it says is feasible.
+    # Answers, of motions that stay those of the plan: their family has proved them.
     if not len(rows):
         return answers
     feeds = _feeds(plan)
@@ -195,7 +195,7 @@ def _stays(is_kept: np.ndarray) -> list[str]:
 
 
 def _jumps(plan: PlannedMotions, faster: list[_Faster], is_better: np.ndarray) -> list[str]:
-    # Tensions jump where a motion turns back at a place at which the robot cannot stay.
+    # Tensions jump where a motion turns back at a position at which the robot cannot rest.
     largest, gravity = 0.0, float(plan.problem.robot.gravity)
     for before, after in itertools.pairwise(faster):
         if is_better[before.ride.segments[-1]] and is_better[after.ride.segments[0]]:

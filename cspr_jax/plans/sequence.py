@@ -31,7 +31,7 @@ class PlanLegs:
         path: named in errors.
 
     Fields:
-        stops: all poses.
+        waypoints: all poses.
         legs: in their order; each begins where the one before ends.
 
     Raises:
@@ -39,7 +39,7 @@ class PlanLegs:
     """
 
     def __init__(self, robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
-        """Refuse poses that are none, and families that do not move the robot."""
+        """Refuse poses without a position, and families that do not move the robot."""
         _check_families(robot_file, plan_file, path)
         _check_keys(plan_file, path)
         _check_poses(robot_file, plan_file, path)

@@ -1,8 +1,8 @@
-"""Legs of families that know neither surroundings nor pulleys: each motion is proved with both once it is made.
+"""Legs of families that ignore obstacles and pulleys: each motion is proved with both once it is made.
 
-See `verification.verifier`. Where numbers of arcs are free, point masses take the smallest number that is proved, over
-pulleys only those on as many cables as degrees of freedom. Without pulleys platforms do so in legs of one segment.
-Others keep the number that their family chooses.
+See `verification.verifier`. Where numbers of arcs are free, the smallest number that is proved is taken: of point
+masses (over pulleys, only with as many cables as degrees of freedom), and of platforms without pulleys in legs of one
+segment. Others keep the number that their family chooses.
 """
 
 import copy
@@ -22,7 +22,7 @@ from cspr_jax.verification.verifier import Verifier
 
 
 class VerifiedLeg(Leg):
-    """Leg of a family, its motions proved with surroundings and pulleys; see `Leg`."""
+    """Leg of a family, its motions proved with obstacles and pulleys; see `Leg`."""
 
     def __init__(self, leg: Leg) -> None:
         """Keep the leg of the family."""
@@ -34,7 +34,7 @@ class VerifiedLeg(Leg):
         self._leg.check(_from_points(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
-        """Answers of the family, which knows neither surroundings nor pulleys; see `Leg.answers`."""
+        """Answers of the family, which ignores obstacles and pulleys; see `Leg.answers`."""
         return self._leg.answers(_from_points(problem), depths)
 
     def warnings(self, problem: Problem) -> list[str]:
@@ -65,7 +65,7 @@ class VerifiedLeg(Leg):
 
         is_determined, has_pulleys = robot.n_cables == robot.dof, verifier.has_pulleys
         is_searched = is_determined or not has_pulleys
-        if waypoints.robot_file.is_platform:  # whose motion depends on those before and behind it
+        if waypoints.robot_file.is_platform:  # its motion in a segment depends on the segments before and after
             is_searched = not has_pulleys and len(self) == 1
         maximum = waypoints.max_arcs if is_searched else 0
         verified = verifier.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
@@ -79,7 +79,7 @@ class VerifiedLeg(Leg):
 
 
 def verified(leg: Leg, *, obstacles: bool, pulleys: bool) -> Leg:
-    """A leg whose verdicts take surroundings and pulleys into account."""
+    """A leg whose verdicts take obstacles and pulleys into account."""
     is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (obstacles or pulleys)
     return VerifiedLeg(leg) if is_needed else leg
 

@@ -1,8 +1,8 @@
 """Sample CSPR3DOF of batotp: a point mass on three cables along a cubic spline, from rest to rest in the least time.
 
-Data and settings are in `batotp_sample.toml`, with their source. That batotp's motion breaks limits was seen in the
-output of that program, which is not here; what is shown here is a motion that is proved to keep all of them and takes
-less time, and a bound that no motion along the same path goes below.
+Data and settings are in `batotp_sample.toml`, with their source. The motion of this module takes less time than
+batotp's and is proved to keep all limits, some of which the output of batotp (not in this package) breaks; a lower
+bound holds for all motions along the same path.
 """
 
 from pathlib import Path

@@ -156,7 +156,7 @@ def _printed() -> dict[Key, str]:
         part, time = row.pop("part"), row.pop("T")
         for p, text in row.items():
             value = float(text)
-            # Zeros at the end are lost in print; below zero the second part has four decimals, too.
+            # Trailing zeros are missing in print; below zero the second part has four decimals, too.
             digits = 5 if part == "Max_b" and value > 0.0 else 4
             for reading in (EXACT, ROUNDED):
                 cells[f"T={time}", f"{part} p={p}", reading] = f"{value:.{digits}f}"

@@ -127,7 +127,7 @@ def orientation_counts(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
 
 
 def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
-    """Counts and proportions at four places; errors are differences from twice the step."""
+    """Counts and proportions at four positions; errors are differences from twice the step."""
     cells: dict[Key, float | None] = {}
     # The step of the table, and twice that for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]

@@ -21,7 +21,7 @@ from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Poses that linear programs and least squares decide as well, evenly over the grid.
+# Poses, evenly over the grid, that linear programs and least squares decide too.
 SAMPLE = 60
 MICRO = 1e6
 
@@ -77,7 +77,7 @@ def grids() -> list[PoseGrid]:
 
 
 def peers() -> dict[Key, float | None]:
-    """The table: poses, those inside and on the boundary, and microseconds a pose of three ways.
+    """The table: poses, those inside and on the boundary, and microseconds for a pose by three methods.
 
     The first poses, with which programs are compiled, are timed as well; those of linear programs (HiGHS) and of least
     squares (NNLS) are some of the grid, in the same run.

@@ -36,7 +36,7 @@ def smallest_proportions(
 ) -> list[float]:
     """Smallest part of the orientations of a position that horizontal transitions attain, in each of many annuli.
 
-    Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
+    Other values of beta-hat than the preferred one are tried only at positions that could have the smallest proportion.
     """
     preferred, likely, rest = attainable.rounds(values)
     sets = [one for annulus in annuli for one in annulus]
@@ -84,7 +84,7 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
 
 
 def _annulus_positions(amplitude: str, depth: float) -> list[np.ndarray]:
-    # Return the positions of the annulus, but one only of those that symmetries of the robot map onto each other.
+    # Return the positions of the annulus, one of each set that symmetries of the robot map onto each other.
     robot = checker_of(amplitude).problem.robot
     azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
     return [

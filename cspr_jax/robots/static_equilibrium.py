@@ -19,7 +19,7 @@ DEPTHS = np.linspace(-0.95, 1.0, 40)
 
 
 def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
-    """Reason why a robot cannot hang still with every cable taut, whichever way the cables share its weight."""
+    """Reason why a robot cannot hang still with every cable taut, whatever its tensions."""
     distance = float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean())
     low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
     high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)

@@ -1,10 +1,9 @@
 """Compiled code that one run leaves to the next.
 
-jax writes an entry straight to its name, and never again: a run that is killed then would leave half an entry for ever.
-So each run has a folder of its own, with links to all whole entries (copies, where the disk has no links), and hands
-its new ones over when it ends. A kept entry ends with its name, and bears a checksum of all of it there: one that was
-damaged, or is a copy of another, is removed before jax sees it; one that cannot be used gives way to what is compiled
-then.
+jax writes an entry directly under its name, and only once: a killed run would leave half an entry for ever. So each run
+has a folder of its own, with links to all complete entries (copies, where the disk has no links), and hands its new
+ones over when it ends. A kept entry ends with its name and a checksum: one that was damaged, or is a copy of another,
+is removed before jax sees it; one that cannot be used is replaced by what is compiled then.
 Entries are code that is executed: a folder in which others can place some is refused.
 """
 
@@ -26,7 +25,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from cspr_jax.runtime.packed import is_too_large, is_whole
+from cspr_jax.runtime.packed import is_complete, is_too_large
 
 # Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
 LARGEST = 512
@@ -181,13 +180,13 @@ def set_aside(beginning: str) -> int:
         for name in names:
             target = run.folder / name
             with contextlib.suppress(OSError):
-                if _identity_of(target) == run.origins[name][1]:  # jax, too, leaves alone what is there
+                if _identity_of(target) == run.origins[name][1]:  # jax does not replace an entry either
                     target.unlink()
     return count
 
 
 def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
-    # jax warns of every single entry that it cannot read or write: the first one is told in our words, the others not.
+    # jax warns of each entry that it cannot read or write: report the first one in our words, and drop the others.
     usual, warned = warnings.showwarning, threading.Event()
 
     def show(message, category, filename, lineno, file=None, line=None):
@@ -233,7 +232,7 @@ def _hand_over(run: _KeptEntries) -> None:
             if entry.name in names and (before is None or _identity_of(entry) == identity):
                 continue
             data = plain_bytes(entry)
-            if is_whole(data):
+            if is_complete(data):
                 if before is not None:
                     before.unlink(missing_ok=True)
                 ending = _ending(entry.name)
@@ -259,7 +258,7 @@ def _trim(entries: Path) -> None:
 
 
 def _ending(name: str) -> bytes:
-    # A kept entry says whose it is: a copy under the name of another is found out.
+    # A kept entry holds its name, so that a copy under another name is noticed.
     words = os.fsencode(f"{__name__}: {name}")
     return _SKIPPED + len(words).to_bytes(4, "little") + words
 

@@ -30,7 +30,7 @@ from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.packed import inflated
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
 
-# It is part of each key: a change of what is written makes former programs those of nobody.
+# Version of the format, part of each key: after a change, former programs are not found.
 _FORMAT = 1
 _FASTEST = 1  # of zlib
 _SCALARS = (bool, int, float, complex)
@@ -41,7 +41,7 @@ _SETTINGS = (
     "jax_numpy_rank_promotion",
     "jax_default_matmul_precision",
 )
-# The place of compiled code says nothing of programs; the folder of a run has another name each time.
+# The folder of compiled code does not change programs; that of a run has another name each time.
 _IRRELEVANT = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
 # A program that cannot be written, read or called; then jax traces the function, as ever.
 _TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
@@ -179,7 +179,7 @@ class _Programs:
 
 
 def _name(function: Callable) -> str:
-    # Its name leads to its compiled form, so that nothing but a place in this package says which one it is.
+    # The name belongs to the compiled function now, so identify the original by its module and line.
     name = f"{function.__module__}:{function.__qualname__}"
     if not name.startswith(f"{__name__.partition('.')[0]}.") or "<" in name:
         raise Undescribed(name)
@@ -223,7 +223,7 @@ def checksum_of_sources(endings: tuple[str, ...] = (".py",)) -> str:
 
 
 def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
-    # None where it is not there, or is not whole, or is another one's; then it is made again.
+    # None where it is absent, incomplete, or another function's; then it is made again.
     try:
         data = inflated(compile_cache.plain_bytes(path), LARGEST_PROGRAM)
         checksum, _, content = data.partition(b"\n")

@@ -15,11 +15,10 @@ from pathlib import Path
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.cores import cores
 
-# Threads that every command needs: for signals, and those of NumPy's library, one for each core. Then threads for jax:
-# some pools of XLA have one for each core.
-FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
-# Threads of NumPy's and SciPy's library for linear algebra, and of all that use OpenMP. With matrices as small as here
-# its threads mostly wait for work, and do so busily: they would take a fifth of the processor time of a plan.
+FEW = 4  # threads that every command needs, for signals, beside those of NumPy's library, one for each core
+OF_JAX, OF_JAX_PER_CORE = 16, 4  # threads of jax: some pools of XLA have one for each core
+# Threads of NumPy's and SciPy's library for linear algebra, and of all that use OpenMP. With our small matrices its
+# threads mostly wait in loops, which would take a fifth of the processor time of a plan.
 OF_OPENBLAS, OF_ALL_LIBRARIES = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"
 # Address space below which jax does not compile a plan on two cores, bytes.
 SMALLEST_MEMORY = 2_000_000_000

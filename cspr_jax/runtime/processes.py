@@ -1,4 +1,4 @@
-"""Worker processes of this machine: each computes on its share of the cores, and none outlives its parent.
+"""Worker processes of this machine, which divide the cores among them; none outlives its parent.
 
 Threads of one process run work outside of XLA one after the other, while XLA's own threads wait in loops: if much of
 the work is outside of XLA, one process for each core, with one thread, is faster.
@@ -21,8 +21,8 @@ from cspr_jax.numerics.cores import VARIABLE, cores
 from cspr_jax.runtime.process_environment import check_threads
 
 SAFE_PATH = "PYTHONSAFEPATH"
-# Most workers; and most where the user does not say how many, since each takes a GB.
-LARGEST, LARGEST_USUAL = 256, 8
+LARGEST = 256  # workers
+LARGEST_USUAL = 8  # workers where the user gives no number, since each takes a GB
 GROUPS = 6  # for each worker: the first one that is done takes another
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
@@ -90,7 +90,7 @@ class Workers:
 
 
 class Spread:
-    """Spread of work on many items over worker processes that stay until the block ends; one does it here.
+    """Spread of work on many items over worker processes, which end with the `with` block; one needs no worker.
 
     Args:
         count: how many processes.

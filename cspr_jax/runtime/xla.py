@@ -1,7 +1,7 @@
-"""Settings that the command line makes before jax starts: vector width, place of compiled code, device, memory arenas.
+"""Settings that the command line makes before jax starts: vector width, folder of compiled code, device, memory arenas.
 
 They are environment variables, which processes that are started from here inherit; arenas are set for this process too.
-Settings of the user win. The library itself comes here only where its user asks it to keep compiled code.
+Settings of the user win. From Python, only `keep_compiled_code` uses this module.
 """
 
 import ctypes
@@ -220,7 +220,7 @@ def _processor() -> tuple[str, ...]:
 
 
 def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
-    # XLA reads what does not begin with a dash as the name of a file of flags: there is no place for ours.
+    # XLA reads a value that does not begin with a dash as the name of a file of flags: ours cannot be added.
     if settings.strip() and not settings.lstrip().startswith("-"):
         return settings
     # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since all of the words
@@ -289,6 +289,6 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
 
 
 def _reason(log: str) -> str:
-    # Its log says why in the first line of an error, after its place in XLA's code.
+    # Its log says why in the first line of an error, after the location in XLA's code.
     lines = [line.partition("] ")[2] for line in log.splitlines() if line[:1] in ("E", "F")]
     return printable(next(filter(None, lines), "it ends the process"))[:_LONGEST_REASON]

@@ -110,6 +110,6 @@ def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np
 
 
 def _side(sides: np.ndarray, dimension: int) -> np.ndarray:
-    # A whole cell is inside where it is for some point, and outside where it is for every one.
+    # A cell is proved inside if it is so for some point, and outside if it is so for every one.
     is_inside, is_outside = (sides == _INSIDE).any(dimension), (sides == _OUTSIDE).all(dimension)
     return np.where(is_inside, _INSIDE, np.where(is_outside, _OUTSIDE, 0)).astype(sides.dtype)

@@ -36,7 +36,7 @@ class Columns:
         return labelled.over(self.arrays(), dims)
 
     def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The answers at the best point of one of the dimensions whose product they are, as of a map."""
+        """The answers at the best point of one dimension; the answers are those of all combinations, as of a map."""
         from cspr_jax.schema import labelled
         from cspr_jax.schema.best import best_of, check_axis
 

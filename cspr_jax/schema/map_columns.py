@@ -21,7 +21,7 @@ OF_POSES = (
     *("limit_margin", "refuted_at", "beta_hat", *TOLERATED),
 )
 POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
-OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
+OF_POSITIONS = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
 OF_ATTAINED = (
     *("attainable", "attainable_fraction", "attainable_volume", "attainable_error", "mean_arcs"),
     *("undecided_fraction", "main_reason", *REFUSALS),

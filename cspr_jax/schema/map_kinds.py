@@ -48,8 +48,8 @@ class MapKind:
             the same.
         planned: whether a cell is the motion of a plan of two poses, which `plans.cell_plan` writes.
         pictured: quantities of which a picture shows the first one that is stored, where nobody says which.
-        motionless: quantities that belong to a place or an instant, not to a motion.
-        families: trajectory families that it takes; none: its cells are places, and it knows no motion.
+        motionless: quantities that belong to a position or a time, not to a motion.
+        families: trajectory families that it takes; none: its cells are positions, without a motion.
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
             orientation or without, at rest in P0 where it is absent.
@@ -162,7 +162,7 @@ _KINDS: dict[str, MapKind] = {
         MapKind(
             name="transition-envelopes",
             title="Envelopes of the pseudotensions along transitions",
-            description="oscillations that each instant of a transition from rest to each target requires",
+            description="oscillations that each time of a transition from rest to each target requires",
             implementation="cspr_jax.families.swings.transitions.envelopes_map:TransitionEnvelopesMap",
             quantities=columns.OF_INSTANTS,
             stored=columns.OF_INSTANTS,
@@ -222,10 +222,10 @@ _KINDS: dict[str, MapKind] = {
             description="orientations of a platform that are accessible at each place",
             implementation="cspr_jax.families.platforms.orientations.orientations_map:OrientationWorkspaceMap",
             cost=CellCost(orientation=3e-6),
-            quantities=columns.OF_PLACES,
-            stored=columns.OF_PLACES,
+            quantities=columns.OF_POSITIONS,
+            stored=columns.OF_POSITIONS,
             pictured=("accessible_volume",),
-            motionless=columns.OF_PLACES,
+            motionless=columns.OF_POSITIONS,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
             by_processes=True,
@@ -238,10 +238,10 @@ _KINDS: dict[str, MapKind] = {
             description="orientations of a platform that are accessible at each place, and attained from rest",
             implementation="cspr_jax.families.platforms.orientations.orientations_map:AttainabilityMap",
             cost=CellCost(orientation=6e-5, limits=5.0, uncertainty=5.0),
-            quantities=(*columns.OF_PLACES, *columns.OF_ATTAINED),
-            stored=(*columns.OF_PLACES, *columns.OF_ATTAINED),
+            quantities=(*columns.OF_POSITIONS, *columns.OF_ATTAINED),
+            stored=(*columns.OF_POSITIONS, *columns.OF_ATTAINED),
             pictured=("attainable_fraction", "accessible_volume"),
-            motionless=columns.OF_PLACES,
+            motionless=columns.OF_POSITIONS,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
             by_processes=True,

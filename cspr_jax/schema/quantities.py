@@ -106,7 +106,7 @@ AXES = {
 }
 # Axes that give an orientation together.
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
-# Axes without a best point: a motion passes all of its instants, and a robot has all of its cables.
+# Axes without a best point: a motion passes all of its times, and a robot has all of its cables.
 _NO_CHOICES = ("tau", "cable")
 
 
@@ -485,7 +485,7 @@ QUANTITIES = {
             "margin_bound",
             "1",
             "proved lower bound of the margin",
-            "Proved: no instant of the segment has a smaller margin.",
+            "Proved: no time of the segment has a smaller margin.",
         ),
         Quantity(
             "feasible_at_infinity",
@@ -563,7 +563,7 @@ QUANTITIES = {
         Quantity(
             "squared_oscillations",
             "1",
-            "squared oscillations N of the instant",
+            "squared oscillations N at that time",
             "N of (1.44) for the cable, or the largest over the cables; at least A''(1) / (4 pi^2), which may be "
             "negative.",
         ),
@@ -974,7 +974,7 @@ QUANTITIES = {
             "tension_margin_bound",
             "N",
             "proved lower bound of the distance of tensions from their limits",
-            "Proved: at no instant of the motion is `tension_margin` smaller.",
+            "Proved: at no time of the motion is `tension_margin` smaller.",
         ),
     )
 }

@@ -108,7 +108,7 @@ class RunFolder:
         return False
 
     def check_held(self) -> None:
-        """Refuse to write on where the lock is no longer this process's, or a folder of the run leads elsewhere."""
+        """Refuse to continue writing if this process has lost the lock, or a folder of the run is now a link."""
         for folder in (self.shards, self.quarantine):
             if folder.is_symlink():
                 raise RefusedError(printable(f"{folder}: is a link: must be a folder of the run: choose another -o"))

@@ -34,7 +34,7 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
 def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
     """Refuse a directory where somebody else keeps files under the names of a run.
 
-    A run makes its lock before anything else, so that where it is, a file that is not whole is a damaged one.
+    A run makes its lock before anything else: beside a lock, an incomplete file is a damaged one.
     """
     if folder.lock.exists() or _record(folder.record) is not None or _owners(folder, reader):
         return

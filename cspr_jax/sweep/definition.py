@@ -28,7 +28,7 @@ from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
-LARGEST_RESULT = 1 << 46  # bytes; the free room on the disk is looked at when a run starts
+LARGEST_RESULT = 1 << 46  # bytes; the free space on the disk is checked when a run starts
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 # Maps of fewer cells are done before a GPU has compiled its code; those whose cells cost more seconds are searches and
 # proofs in many short steps, for each of which a GPU has to start (docs/performance.md, GPU).
@@ -166,7 +166,7 @@ def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
-    # This check comes before any memory is taken; `check_room` looks at the free room when the run starts.
+    # This check comes before any memory is taken; `check_disk_space` looks at the free space when the run starts.
     shape, label = tuple(counts.values()), f"axes: {_cells_of(counts)}"
     if needed > LARGEST_RESULT:
         raise ConfigError(path, f"{label} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
@@ -183,7 +183,7 @@ def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int,
     raise ConfigError(path, f"{label} is too large: must be at most {maximum} cells; fewer points, or several sweeps")
 
 
-def check_room(sweep: Sweep, directory: Path, done: float) -> None:
+def check_disk_space(sweep: Sweep, directory: Path, done: float) -> None:
     """Refuse a sweep whose files would not fit on the disk."""
     folder = next(path for path in (directory, *Path(os.path.abspath(directory)).parents) if path.is_dir())
     needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.spec.run.dtype) * (1.0 - 0.5 * done)

@@ -22,7 +22,7 @@ from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.reading.isolated import Reader
 from cspr_jax.store.shards import Shard, encode
 from cspr_jax.sweep import claims
-from cspr_jax.sweep.definition import Sweep, attributes, check_room
+from cspr_jax.sweep.definition import Sweep, attributes, check_disk_space
 from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.work import Computed, Executor
 
@@ -46,7 +46,7 @@ class Options:
 
 @dataclasses.dataclass(frozen=True)
 class RunSummary:
-    """Outcome of a run.
+    """Result of a run, in numbers.
 
     Fields:
         result: path of the finished file; of the directory, where only some tiles were asked for.
@@ -122,7 +122,7 @@ class Run:
 
     def _go(self, executor: Executor) -> RunSummary:
         claims.refuse_strangers(self._folder, self._reader)
-        check_room(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
+        check_disk_space(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
         environment, accept = executor.environment(), self._options.accept_environment_change
         claims.refuse_other_environment(self._folder, environment, accept, self._reader)  # before anything is made
         self._folder.make()
@@ -133,7 +133,7 @@ class Run:
             claims.refuse_other_environment(self._folder, environment, accept, self._reader)
             self._folder.remove_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
-            if self._is_whole():  # another process finished it meanwhile
+            if self._is_complete():  # another process finished it meanwhile
                 if self._options.prune:
                     self._prune()
                 return RunSummary(self._folder.result, 0, len(self._tiling))
@@ -205,7 +205,7 @@ class Run:
 
     def _note_stop(self) -> None:
         code = self._hooks.stop.code
-        with contextlib.suppress(StoreError):  # people read it, no decision does
+        with contextlib.suppress(StoreError):  # the note is for people only; nothing is decided by it
             by = {ExitCode.TERMINATED: "SIGTERM", ExitCode.INTERRUPTED: "Ctrl-C"}.get(code) if code else None
             self._folder.note("stopped", by=by)
 
@@ -243,7 +243,7 @@ class Run:
                 f"{self._folder.shards}: a shard changed while it was read: {error}; run it again"
             ) from error
 
-    def _is_whole(self) -> bool:
+    def _is_complete(self) -> bool:
         content = claims.content_at(self._folder.result, self._reader)
         return isinstance(content, Content) and content.identity == self._sweep.identity
 

@@ -87,7 +87,7 @@ def verify(path: Path) -> dict[str, Any]:
 
 
 def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> bool:
-    # A damaged file is a fault; a file that the system or the disk refuses to read may be whole.
+    # Damaged files are reported; a file that the system or the disk refuses to read may be intact.
     try:
         read()
     except DamagedError as error:
@@ -170,7 +170,7 @@ def _settings(record: Record) -> Settings:
 
 
 def _entries(log: Path) -> list[dict[str, Any]]:
-    # The last lines of the log that are whole, the newest first; nothing depends on them.
+    # The last complete lines of the log, the newest first; nothing depends on them.
     try:
         lines = read_regular(log, LOG_TAIL, last=True).splitlines()
     except (DamagedError, StoreError):

@@ -49,7 +49,7 @@ class Stop:
         return self.code is not None
 
     def ask(self, number: int, frame: FrameType | None = None) -> None:
-        """Ask to stop; asked again, end the process: whatever was published stays whole."""
+        """Ask to stop; asked again, end the process: what was published stays intact."""
         del frame
         if self.code is None:
             self.code = CODES[signal.Signals(number)]
@@ -125,7 +125,7 @@ class Prompt:
 def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
     """Say at once that Ctrl-C or SIGTERM was noticed, and end the process where KeyboardInterrupt does not do so soon.
 
-    Files get their names only when they are whole, so nothing half-written is left.
+    Files get their names only when they are complete, so nothing half-written is left.
     """
     prompt, pressed, over = Prompt(), threading.Event(), threading.Event()
     if threading.current_thread() is not threading.main_thread():

@@ -11,17 +11,17 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.map_kinds import MapKind
 from cspr_jax.sweep.checks import is_given
 
-# Work of a tile on one core; two cores share it, and a slow one takes twice as long.
+# Seconds of a tile on one core; two cores need half of it, a slow core twice as much.
 TILE_SECONDS = 40.0
-# A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and a
-# tile of a platform's poses takes half a second whatever it holds.
+# A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and
+# even a small tile of a platform's poses takes half a second.
 FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
 # Seconds that uncertainty takes a cell with 30 arcs, before what `CellCost` says of a kind of map.
 UNCERTAINTY_SECONDS = 1e-2
 # Likewise for a workspace, by what else is computed for each cell.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
-# Likewise for motions among obstacles, by how many there are: each motion that is feasible without them is judged.
-JUDGED_SECONDS, OBSTACLE_SECONDS = 5e-3, 1e-3
+# Likewise for motions among obstacles, by how many there are: each motion that is feasible without them is proved.
+PROOF_SECONDS, OBSTACLE_SECONDS = 5e-3, 1e-3
 ARCS = 30
 
 
@@ -32,7 +32,7 @@ def cell_seconds(kind: MapKind, spec: SweepFile) -> float:
         limits += kind.cost.uncertainty * UNCERTAINTY_SECONDS
     conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(spec, f"workspace.{name}"))
     if spec.obstacle_keys:
-        conditions += JUDGED_SECONDS + OBSTACLE_SECONDS * len(spec.obstacle or ())
+        conditions += PROOF_SECONDS + OBSTACLE_SECONDS * len(spec.obstacle or ())
     divisions = (spec.orientations or Orientations()).divisions
     motion = (kind.cost.seconds + limits) * (spec.trajectory.max_arcs / ARCS if kind.families else 1.0)
     return motion + conditions + kind.cost.orientation * 4 * divisions**3

@@ -1,4 +1,4 @@
-"""Verification: is any motion of any robot within its limits, at every instant, by proof.
+"""Verification: is any motion of any robot within its limits, at every time, by proof.
 
 Slacks of criteria are bounded over blocks of time (`bounds`), which are halved until each criterion is decided
 (`time_proof`); verdicts, margins and causes follow. `robustness` asks the same for all robots within an uncertainty.

@@ -22,9 +22,9 @@ from cspr_jax.verification.criteria import levels
 from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
-# Samples that are followed for each criterion at first, and then; rounds, each eight times as fine.
-STARTS, FOLLOWED, ROUNDS = 6, 2, 7
-# Blocks of a criterion that are sampled at most: those with the smallest upper bounds.
+STARTS, FOLLOWED = 6, 2  # samples that are followed for each criterion, in the first round and in further ones
+ROUNDS = 7  # rounds of sampling, each eight times as fine as the one before
+# Largest number of blocks that are sampled for a criterion: those with the smallest upper bounds.
 MOST_BLOCKS = 1000
 Slacks = Callable[[np.ndarray], np.ndarray]
 
@@ -69,7 +69,7 @@ def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
     columns = columns[columns < proof.near.slacks.low.shape[1]]  # feeds come last, from another proof
     smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))
     high, when = proof.high.copy(), proof.when.copy()
-    # A touch between two floats is proved but not attained.
+    # A limit that is touched between two neighbouring floats is proved to be touched, but no sample attains it.
     level = levels(case.criteria)[columns]
     is_seen = np.isfinite(smallest) & ~((high[columns] < level) & (smallest >= level))
     high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
@@ -85,7 +85,7 @@ def _nearest(case: MotionProof) -> np.ndarray:
 
 
 def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    # Starts and ends (2, k) of the blocks to sample, tau, and which criteria (k, m) each may be the worst of.
+    # Starts and ends (2, k) of the blocks to sample, tau, and the criteria (k, m) whose smallest slack each may hold.
     may_hold = near.slacks.low[:, columns] <= high[columns]
     upper = np.where(may_hold, near.slacks.high[:, columns], np.inf)
     for column in np.flatnonzero(may_hold.sum(0) > MOST_BLOCKS):
@@ -95,7 +95,7 @@ def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: f
 
 
 def _minima(slacks: Slacks, blocks: tuple[np.ndarray, np.ndarray], joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest slack of each of m criteria, and when, tau, by samples of blocks and then around the best.
+    # Smallest slack of each of m criteria, and its tau, by samples of blocks and then around the best ones.
     edges, may_hold = blocks
     inner = joints[(np.searchsorted(edges[0], joints, "right") > np.searchsorted(edges[1], joints))]
     knots = np.unique(np.concatenate([*edges, inner, inner * (1.0 - BESIDE)]))

@@ -4,7 +4,7 @@ In natural units (N, m, m/s, m/s^2), with n cables:
 
     tension     of n = dof cables: n distances of the tensions from their limits; of more: the largest distance that all
                 tensions together can have from their limits
-    limits      that are given, one for each cable, of the floor one: depth, length, speed, acceleration
+    limits      one for each cable, of the floor one, for each limit that is given
     regular     of a platform on n = dof cables: size of the normalised determinant less what counts as singular
     below       of a point mass or a rigid platform on n = dof cables: depth below the plane of the spools
     contacts    of all bodies that can meet: clearance of their surfaces, `robots.bounds.contact_bounds`
@@ -38,8 +38,8 @@ FLAGS = {
     "obstacle": Verdict.OBSTACLE,
     "platform-obstacle": Verdict.OBSTACLE,
 }
-# Flags of what can happen at a single instant.
-AT_INSTANTS = (Verdict.SINGULAR, *FLAGS.values())
+# Flags of what can happen at a single time.
+AT_TIMES = (Verdict.SINGULAR, *FLAGS.values())
 
 
 class Criterion(NamedTuple):
@@ -52,7 +52,7 @@ class Criterion(NamedTuple):
         obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
         allowed: the least, or the most, that the quantity may be.
         sense: whether it must be at least or at most so large.
-        allowance: by how much it may miss that: limits may be touched.
+        allowance: by how much the quantity may miss it, since limits may be touched.
     """
 
     flag: Verdict
@@ -73,7 +73,7 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
     numbers = range(robot.n_cables)
     low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
     if robot.n_cables > robot.dof:
-        # All tensions together miss their limits by one number: no smallest one by more than its share.
+        # One number says by how much all tensions together miss their limits.
         rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N", allowance=TOUCHED * min(low))]
     else:
         rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k], allowance=TOUCHED * low[k]) for k in numbers]
@@ -92,7 +92,7 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
             Criterion(row.flag, each, row.unit, None, value, row.sense, float(allowance(row, value, robot)))
             for each, value in zip(cables, values, strict=True)
         ]
-    is_regular, is_below = judged_poses(robot)
+    is_regular, is_below = pose_conditions(robot)
     rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
     rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
     return rows + contact_criteria(robot, limits, scene)
@@ -120,7 +120,7 @@ def has_extent(robot: AnyRobot, scene: Scene) -> bool:
     return isinstance(robot, PlatformRobot) or scene.body is not None
 
 
-def judged_poses(robot: AnyRobot) -> tuple[bool, bool]:
-    """Tell which conditions of poses are judged."""
+def pose_conditions(robot: AnyRobot) -> tuple[bool, bool]:
+    """Tell whether poses must be regular, and below the spools."""
     is_determined = robot.n_cables == robot.dof
     return is_determined and PATTERNS[robot.pattern].is_body, is_determined and robot.pattern in BELOW

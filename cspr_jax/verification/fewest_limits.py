@@ -1,4 +1,4 @@
-"""Why no candidate is feasible: the limit that alone stands in the way, if there is one.
+"""Why no candidate is feasible: the only limit that is broken, if there is such a limit.
 
 A limit can be raised, but a cable cannot push, and two cables cannot pass through each other. So candidates that only
 limits refuse come first. Among them, the first one that breaks a single limit, and is proved otherwise, tells which
@@ -53,7 +53,7 @@ class FewestLimits:
     def take(
         self, rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"], broken: Bool[np.ndarray, "m n_criteria"]
     ) -> None:
-        """Take in candidates that are proved but for limits."""
+        """Take in candidates that are proved except for limits."""
         ranks = rank(self._flags, broken)
         better = ranks < self._least[rows]
         self._arcs[rows[better]], self._broken[rows[better]] = arcs[better], broken[better]
@@ -61,7 +61,7 @@ class FewestLimits:
         self._common[rows] &= broken
 
     def may_change(self, rows: Int[np.ndarray, "m"], broken: Bool[np.ndarray, "m n_criteria"]) -> Bool[np.ndarray, "m"]:
-        """Tell which candidates can change what is known, since fewer limits may refuse them, or others."""
+        """Tell which candidates can change the answer, because they may break fewer limits, or others."""
         return (rank(self._flags, broken) < self._least[rows]) | (self._common[rows] & ~broken).any(1)
 
     @property

@@ -20,9 +20,9 @@ from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, radi
 
 # Half the length of short blocks over the usual one.
 SHORT = 1e-6
-# By how much of what is missed the bounds of a piece may be apart. Of slacks in their units: by how much at least, and
-# times that a piece is halved.
-LOOSE, SMALLEST, HALVINGS = 0.5, 1e-7, 5
+LOOSE = 0.5  # bounds of a piece are close if they differ by less than this fraction of the violation,
+SMALLEST = 1e-7  # or by less than this in the unit of the slack
+HALVINGS = 5  # of a piece, at most
 Sides = tuple[np.ndarray, np.ndarray]
 
 
@@ -49,7 +49,7 @@ def piece_slacks(
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
         if problem.limits.uncertainty is None:
             return slacks.low, slacks.high
-        # Slacks that are proved of all robots in the middle of a block are not far above the smallest of them.
+        # Lower bounds for all robots in the middle of a block are close to the smallest slack of these robots.
         middles = motion.bounds(*short_blocks(0.5 * (start + end), end - start))
         low, high = (all_robots_slacks(problem, states) for states in (motion.bounds(start, end), middles))
         return _first_less(slacks.low, low), _first_less(slacks.high, high)
@@ -65,12 +65,12 @@ def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1
 
 
 def short_blocks(times: Float[np.ndarray, "k"], lengths: Float[np.ndarray, "k"]) -> Sides:
-    """Blocks that are so short that what is bounded over them is known."""
+    """Blocks that are so short that bounds over them are nearly exact."""
     return times - SHORT * lengths, times + SHORT * lengths
 
 
 def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
-    # The smaller ones of slacks, of which the others are the first columns.
+    # Slacks whose first columns are replaced by others where these are smaller.
     count = others.shape[1]
     return np.concatenate([np.minimum(slacks[:, :count], others), slacks[:, count:]], axis=1)
 
@@ -85,8 +85,8 @@ def close_bounds(
         below, above = bounded(piece, start, end)
         low, high = bounds = bounds or (np.full(below.shape, np.inf), np.full(below.shape, np.inf))
         np.minimum.at(high, piece, above)
-        # A block says how much is missed where the lower bound is about as close as the upper one.
-        # Halving does not help if nothing is known even of the middle.
+        # A block is small enough if its lower bound is about as close as its upper one.
+        # Halving does not help if even the middle has no bound.
         is_open = (below < 0.0) & (below < above - LOOSE * np.maximum(-above, smallest))
         is_loose = np.any(is_open, axis=1) & (level < halvings)
         np.minimum.at(low, piece[~is_loose], below[~is_loose])

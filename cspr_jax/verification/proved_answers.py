@@ -22,11 +22,11 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria, levels
+from cspr_jax.verification.criteria import AT_TIMES, Criterion, contact_criteria, criteria, levels
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
-# Intervals between instants of a motion that is only sampled.
+# Intervals between samples of a motion that is only sampled.
 SAMPLES = 2000
 ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
@@ -38,7 +38,7 @@ class MotionProof(NamedTuple):
     Fields:
         criteria: of a robot within its limits.
         proof: of the same criteria.
-        scales: (n_criteria,) sizes by which slacks of several criteria are compared, in their units.
+        scales: (n_criteria,) divisors with which slacks of different criteria are compared, in their units.
         obstacles: their names.
         feeds: (pieces,) largest speed of the mass centre in each piece of the motion, m/s, inf for none; None: there
             are none.
@@ -59,7 +59,7 @@ class MotionProof(NamedTuple):
 
     @property
     def broken(self) -> np.ndarray:
-        """Mask (n_criteria,) of the criteria that fail at some instant."""
+        """Mask (n_criteria,) of the criteria that fail at some time."""
         return (self.proof.high < levels(self.criteria)) | np.array(
             [len(intervals) > 0 for intervals in self.proof.failing]
         )
@@ -110,7 +110,7 @@ class MotionProof(NamedTuple):
 
     @property
     def failing(self) -> np.ndarray:
-        """Intervals in which at least one criterion fails, (m, 2) s, in their order and apart from each other."""
+        """Intervals in which at least one criterion fails, (m, 2) s, in order, without overlaps."""
         return united(np.concatenate([np.empty((0, 2)), *self.proof.failing]))
 
     @property
@@ -164,12 +164,12 @@ def proved_answers(
     for i, speeds in enumerate(feeds):
         proofs[i] = proofs[i].with_feeds(motions[i], speeds)
     answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
-    judge_all_robots(problem, answers, motions, scene)
+    verify_all_robots(problem, answers, motions, scene)
     return answers
 
 
-def judge_all_robots(problem: Problem, answers: Answers, motions: Sequence[Any], scene: Scene | None = None) -> None:
-    """Judge feasible motions for all robots within an uncertainty, if there is one."""
+def verify_all_robots(problem: Problem, answers: Answers, motions: Sequence[Any], scene: Scene | None = None) -> None:
+    """Verify feasible motions for all robots within the uncertainty, if there is one."""
     if problem.limits.uncertainty is not None:
         for i in np.flatnonzero(answers.feasible).tolist():
             proved, refuted = (float(side[0]) for side in motion_tolerances(problem, motions[i], scene))
@@ -216,8 +216,8 @@ def proofs_of(
         of_motion = partial(bounds, motion)
         return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, contacts_alone=contacts_alone)
 
-    # Answers tell the nearest contact of each kind alone.
-    names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
+    # Answers name only the nearest contact of each kind.
+    names = [(row.flag, () if row.flag in AT_TIMES else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), intervals=intervals)
     return [_proof(problem, rows, proof, scene, contacts_alone) for proof in proofs]
@@ -273,13 +273,13 @@ def sampled_proof(
 ) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 
-    A motion that takes no finite time is sampled at rest along its path, with no time but that of its start.
+    A motion whose duration is not finite is sampled at rest along its path; all samples have the time of the start.
     """
     tau, duration = np.linspace(0.0, 1.0, samples + 1), float(motion.duration())
     states, times = states_as_bounds(motion, tau), tau * duration
     if not np.isfinite(duration):
         states, times = at_rest(states), np.where(tau > 0.0, np.nan, 0.0)
-    # A block without a length has the slacks of its instant.
+    # A block without a length has the slacks at its time.
     high = block_slacks(
         problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
     ).high
@@ -298,7 +298,7 @@ def sampled_proof(
 
 
 def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
-    # Blocks between instants, of which nothing is known from below.
+    # Blocks between samples, without lower bounds.
     upper = np.minimum(high[1:], high[:-1])
     slacks = BlockSlacks(np.full_like(upper, -np.inf), upper).complete()
     return TimeBlocks(np.zeros(len(upper), int), times[:-1], times[1:], slacks)
@@ -313,7 +313,7 @@ def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
 
 
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
-    # Tensions compare with the weight a cable, lengths with the robot, and others with what is allowed.
+    # Slacks of tensions are over weight / n_cables, of lengths over the robot's radius, others over the allowed value.
     robot = problem.robot
     weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
     of_unit = {"N": weight, "m": radius, "1": 1.0}

@@ -10,9 +10,9 @@ import numpy as np
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.shapes import Float
 
-# Slack of limits within which the motion may touch one.
+# A motion may touch a limit if the slack is below this.
 NEARLY = 1e-4
-# Limits whose slacks are proved of squares.
+# Limits on speeds, whose proved slacks are those of the squares.
 SPEEDS = ("cable_speed_max", "speed_max")
 
 
@@ -22,8 +22,8 @@ class Verdicts:
 
     Fields:
         verdict: flags of `Verdict`; 0 if proved.
-        margin: smallest slack of taut cables that is attained: of lines a distance from faces, m/s^2; of Bezier
-            segments without a unit, the depth below the spools included.
+        margin: smallest slack of taut cables that is attained: for lines a distance from facets, m/s^2; for Bezier
+            segments a number without a unit, which includes the depth below the spools.
         bound: proved lower bound of the margin.
         limit_margin: smallest slack of the limits, without a unit; inf without limits.
     """
@@ -42,7 +42,7 @@ class Verdicts:
 def with_touched(
     problem: Problem, strict: Verdicts, verdicts_of: Callable[[Problem, np.ndarray], Verdicts]
 ) -> Verdicts:
-    """Verdicts, of which those of motions that may touch a limit are by the wider limits of proofs; margins stay."""
+    """Verdicts; motions that may touch a limit get those by the wider limits of proofs. Margins stay."""
     rows = np.flatnonzero((strict.verdict != 0) & (np.abs(strict.limit_margin) < NEARLY))
     if len(rows):
         strict.verdict[rows] = verdicts_of(touchable(problem), rows).verdict
@@ -52,5 +52,5 @@ def with_touched(
 def plain_slack(
     name: str, values: Float[np.ndarray, "..."], squared: tuple[str, ...] = SPEEDS
 ) -> Float[np.ndarray, "..."]:
-    """Slack of a limit as it is shown."""
+    """Slack of a limit as results show it."""
     return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name in squared else values

@@ -1,4 +1,4 @@
-"""Smallest numbers, as of arcs, whose motions are proved: tried in increasing order, for many motions at once."""
+"""Smallest numbers, such as those of arcs, whose motions are proved: tried in increasing order, for many motions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from cspr_jax.numerics.shapes import Int
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Takes the motions to try, (m,) indices, and the smallest number to try of each. Returns the number that was tried of
-# each, not below that, or `NONE` where there is none, and the verdict.
+# Takes indices (m,) of motions, and the smallest number to try for each. Returns the number that was tried, which may
+# be larger, or `NONE` without one; and the verdict.
 Trial = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 NONE = -1
 FEWER = FLAGS(Verdict.FEWER_ARCS_UNDECIDED)
@@ -23,7 +23,7 @@ class Smallest(NamedTuple):
 
     Fields:
         number: (n,) the smallest number that is proved; NONE: none is.
-        undecided: (n,) the smallest number up to there that stayed undecided, or left smaller ones so; NONE: none did.
+        undecided: (n,) the smallest number, up to that, for which it or a smaller one stayed undecided; NONE: none.
     """
 
     number: np.ndarray

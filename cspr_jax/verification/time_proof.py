@@ -1,9 +1,9 @@
 """Proof of any motion over its whole time: blocks are cut until each criterion is decided on each of them.
 
-A criterion is met throughout a block if the lower bound of its slack is above its level, which is zero or, of limits,
-which may be touched, a little less, and broken throughout if the upper bound is below it. What is left when blocks are
-as short as the resolution are the ends of intervals in which a criterion fails, or instants that are undecided. Open
-blocks of all motions are bounded together.
+A criterion has a level: zero or, for limits, which may be touched, a little less. It is met throughout a block if the
+lower bound of its slack is above the level, and broken throughout if the upper bound is below it. What is left when
+blocks are as short as the resolution are the ends of intervals in which a criterion fails, or times that are undecided.
+Open blocks of all motions are bounded together.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.verification.bounds.block_parts import TimeBlocks, joined
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 
-# Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
-FIRST = 32
+FIRST = 32  # blocks at the start
+# Bounds of the smallest slack are narrowed to this fraction of it, or of a tenth of the usual slack if that is larger.
 CLOSE = 0.002
-# Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
+# Largest numbers of blocks of one motion: to decide criteria, and to narrow margins.
 MAX_BLOCKS, NARROWING = 100_000, 4_000
-# TimeBlocks that narrow a margin are no shorter than this part of the resolution.
+# Blocks that narrow a margin are no shorter than this fraction of the resolution.
 SHORTEST = 1e-3
 
 
@@ -34,11 +34,11 @@ class TimeProof:
     Fields:
         low: (n_criteria,) lower bound of each slack over the whole motion.
         high: (n_criteria,) upper bound of the smallest slack.
-        when: (n_criteria,) an instant within the block in which that bound was found, s.
+        when: (n_criteria,) a time within the block at which that bound was found, s.
         failing: for each criterion (m, 2) intervals of time in which it fails throughout, s; as wide as is proved.
         open: for each criterion (m, 2) intervals, none longer than the resolution unless blocks ran out, that are
             undecided.
-        blocks: number of blocks that were looked at.
+        blocks: number of blocks that were bounded.
         near: blocks that may hold the smallest slack of some criterion; None: not known.
     """
 
@@ -110,7 +110,7 @@ def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, ful
 
 
 def _usual(high: np.ndarray, count: int) -> np.ndarray:
-    # Size that slacks of each motion usually have, (count, n_criteria).
+    # Usual magnitude of the slacks of each motion, (count, n_criteria).
     return np.median(np.where(np.isfinite(high), np.abs(high), 0.0).reshape(count, FIRST, -1), axis=1)
 
 
@@ -137,7 +137,7 @@ def _narrowed(
     more = np.zeros(count, int)
     minimum = _grouped(_smallest(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
-        # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
+        # Use the usual magnitude of slacks, too: near zero no fraction of the smallest one could be reached.
         with np.errstate(invalid="ignore"):  # of bounds that are infinite
             level = (minimum - CLOSE * np.fmax(np.abs(minimum), 0.1 * usual))[blocks.motion]
         matters = (blocks.slacks.low < level) & np.isfinite(level)

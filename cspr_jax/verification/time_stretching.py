@@ -1,9 +1,10 @@
 """Least uniform stretching of time with which a motion is feasible.
 
 Stretched by c, velocities are divided by c and accelerations by c^2, so that what the cables must supply is affine in
-u = 1 / c^2. Tensions within limits for u and for v share out to tensions for each u between them: at every instant the
-feasible u are an interval, and so they are for a whole motion. The smallest distance from limits of tensions is concave
-in u, and speeds and accelerations of cables only fall: a search along u finds a feasible stretching if there is one.
+u = 1 / c^2. Means of tensions within limits for two values of u are such tensions for values between them: at every
+time the feasible u are an interval, and so they are for a complete motion. The smallest distance of tensions from
+their limits is concave in u, and speeds and accelerations of cables only fall: a search along u finds a feasible
+stretching if there is one.
 """
 
 import math
@@ -12,8 +13,8 @@ from typing import NamedTuple
 
 from cspr_jax.verification.proved_answers import TENSIONS, MotionProof
 
-# Times by which a motion is slowed down until it counts as at rest, and the ratio to which the least one is narrowed.
-SLOWEST, CLOSE = 1e6, 1e-6
+SLOWEST = 1e6  # factor of stretching from which on a motion counts as at rest
+CLOSE = 1e-6  # relative error of the least factor
 # Steps of the search for a feasible u where rest is not feasible, each of which narrows it by the golden section.
 STEPS, GOLDEN = 40, 0.5 * (math.sqrt(5.0) - 1.0)
 
@@ -65,7 +66,7 @@ def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof
 
 
 def _any_feasible(proved: Callable[[float], MotionProof], slowest: MotionProof) -> tuple[float, MotionProof] | None:
-    # Criteria but tensions that are broken at rest stay broken. Otherwise the worst slack has one highest point over u.
+    # Criteria other than tensions stay broken if they are so at rest. Otherwise the worst slack has one maximum over u.
     if any(
         is_broken and not row.flag & TENSIONS for row, is_broken in zip(slowest.criteria, slowest.broken, strict=True)
     ):

@@ -1,6 +1,6 @@
-"""Motions of families that know neither bodies that can meet nor pulleys, proved with both: smallest numbers of arcs.
+"""Motions of families that ignore contacts and pulleys, proved with both: smallest numbers of arcs.
 
-The family makes its motions as for cables from points that meet nothing. Among obstacles, or with the shape of a
+The family makes its motions for cables that leave from points and meet nothing. Among obstacles, or with the shape of a
 platform, contacts alone are then proved, since the family has proved the rest; over pulleys, everything is. Where
 numbers of arcs are free, larger ones are tried until the motion is proved.
 """
@@ -22,7 +22,7 @@ from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_o
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
 
-# Gives answers and motions of some segments, by their numbers, with numbers of arcs: those of `Waypoints.arcs`.
+# Gives answers and motions of some segments, by their indices, with numbers of arcs as in `Waypoints.arcs`.
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
 
 
@@ -30,7 +30,7 @@ class VerifiedSegments(NamedTuple):
     """Answers of n segments.
 
     Fields:
-        answers: the family's, with the verdicts of further proofs, and what they leave of an uncertainty.
+        answers: the family's, with the verdicts of further proofs, and the uncertainty that these tolerate.
         proofs: of the motions; None: the family refuses the motion, or has none.
         arcs: (n,) numbers with which the family joins the segments by these motions.
     """
@@ -71,7 +71,7 @@ class Verifier(NamedTuple):
         answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
         verdict, is_free = trial.verdict.copy(), (arcs == 0) & (step * max_arcs > 0)
         doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNDECIDED != 0)
-        # Over pulleys the family's choice says nothing.
+        # Over pulleys the number that the family chooses means nothing.
         rows = np.flatnonzero(is_free & (self.has_pulleys | (answers.feasible & (verdict != 0))))
         minimum = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
 
@@ -101,7 +101,7 @@ class Verifier(NamedTuple):
         return VerifiedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
 
     def columns(self, join: Join, count: int, *, max_arcs: int) -> dict[str, np.ndarray]:
-        """Columns of a map whose motions keep clear of obstacles, as the plan of each cell says."""
+        """Columns of a map whose motions keep clear of obstacles, with the answers that the plan of each cell gives."""
         answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=1, max_arcs=max_arcs)
         clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
         return answers.arrays() | {"clearance": clearance}
@@ -128,7 +128,7 @@ class Verifier(NamedTuple):
         return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
-        # Verify feasible motions for all robots within an uncertainty; the family has done so but for contacts.
+        # Verify feasible motions for all robots within an uncertainty; the family has done so except for contacts.
         proved, refuted = answers.tolerated.copy(), answers.not_tolerated.copy()
         for i in rows.tolist():
             ours = motion_tolerances(self.problem, motions[i], self.scene, contacts_alone=True)

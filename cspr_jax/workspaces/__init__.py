@@ -1,11 +1,10 @@
 """Workspaces: poses at which the cables of a robot can hold its effector, for any robot on any number of cables.
 
-Static, wrench-feasible and wrench-closure workspaces rest on one test: a pose is inside if every cocircuit of its
-wrench matrix (a vector of the row space with the fewest components that are not zero) leaves the required wrenches
-within the limits of the tensions. The least value of all cocircuits is the margin, in newtons, between two bounds that
-allow for rounding. Tensions over lengths make the wrench matrix affine in the position, so that whole cells of a grid
-can be proved. Clearances, speeds of cables, sets of orientations, sensitivities and feasible accelerations are here
-too.
+Static, wrench-feasible and wrench-closure workspaces rest on one test: a pose is inside if along every facet normal
+(normal to dof - 1 columns of the wrench matrix) tensions within their limits supply the required wrenches. The least
+slack of all facet normals is the margin, in newtons, between two bounds that allow for rounding. Tensions over lengths
+make the wrench matrix affine in the position, so that whole cells of a grid can be proved. Clearances, speeds of
+cables, sets of orientations, sensitivities and feasible accelerations are here too.
 
 Sources: hyperplane shifting by Bouchard, Gosselin and Moore (2010) and by Gouttefarde and Krut (2010); docs/theory.md
 has the formulas.

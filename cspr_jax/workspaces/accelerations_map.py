@@ -15,7 +15,7 @@ MAX_CABLES = 20
 
 
 class FeasibleAccelerationMap(PointMassMap):
-    """The accelerations that are feasible at each place; see `GridMap`."""
+    """The accelerations that are feasible at each position; see `GridMap`."""
 
     any_cables = True
 
@@ -32,7 +32,7 @@ class FeasibleAccelerationMap(PointMassMap):
         return answers | {"verdict": answers["verdict"].astype(FLAGS)}
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        """Refuse positions out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

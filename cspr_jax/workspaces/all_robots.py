@@ -3,8 +3,8 @@
 At a pose with given spools the wrenches that tensions within limits supply are a convex set, and those that a mass
 needs with its centre at a given position are linear in the mass: what both the smallest and the largest mass have, all
 masses between have. A force f that acts at a mass centre displaced by d adds d x f to the moment about its nominal
-position. For a vertical force these moments fill a disk; for forces of all directions they lie in a ball, not each with
-each.
+position. For a vertical force these moments fill a disk; for forces of all directions they lie in a ball, though not
+every pair of force and moment occurs.
 """
 
 import dataclasses
@@ -78,7 +78,7 @@ def mass_searches(
 def _off_centre(
     robot: AnyRobot, wrenches: RequiredWrenches, radius: float, *, is_vertical: bool
 ) -> tuple[RequiredWrenches, bool]:
-    # Wrenches that include those of mass centres off their place, with moments up to `radius`; whether each is needed.
+    # Wrenches that include those of displaced mass centres, with moments up to `radius`; whether each is needed.
     row = PATTERNS[robot.pattern]
     axes = np.zeros(robot.dof)
     axes[len(row.forces) :] = radius

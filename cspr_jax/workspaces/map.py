@@ -38,7 +38,7 @@ DIVISIONS = 12
 
 
 class WorkspaceMap(GridMap):
-    """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
+    """The workspace of a robot: of poses, or of positions with sets of orientations; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse conditions that do not apply to the robot."""
@@ -132,7 +132,7 @@ class WorkspaceMap(GridMap):
         return products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
 
     def _all_robots(self, robot_file: RobotFile, conditions: Sequence[str]) -> AllRobots | None:
-        # All robots within the uncertainty, without which there are none.
+        # All robots within the uncertainty; None without an uncertainty.
         uncertainty, workspace = self._limits.uncertainty, self._workspace
         if uncertainty is None:
             return None
@@ -204,7 +204,7 @@ class WorkspaceMap(GridMap):
         return np.stack(half_sizes, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        """Refuse positions out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
         row = self._row
         if row.is_planar and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")

@@ -1,7 +1,7 @@
 """Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
 
-A pose is answered by the fastest method first, then by surer ones until its answer is beyond rounding: the null space
-of six to eight cables in space, the normals to dof - 1 cables, singular values.
+A pose is answered by the fastest method first, then by more accurate ones until rounding cannot change the answer: the
+null space of six to eight cables in space, the normals to dof - 1 cables, singular values.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ MAX_SHORT = 8  # short batches
 # Bytes of the wrench matrices of a batch where poses are many: large beside the start of a call, and small enough for
 # caches to hold most of them.
 BYTES = 6_400_000
-# Poses by which the base block is chosen; poses by which choices of cables without a cocircuit are left out.
-TRIALS, FEW_TRIALS = 200, 8
+TRIALS = 200  # poses by which the base block is chosen
+FEW_TRIALS = 8  # poses by which choices of cables without a facet are left out
 # Number of boxes in which such poses are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
 WIDENINGS = 40
-# Up to so many open poses are answered by singular values at once: compiling for them would take longer.
+# If no more poses than this are open, singular values answer them at once: compiling would take longer.
 FEW = 100
 
 
@@ -256,7 +256,7 @@ class WorkspaceSearch:
 
     @property
     def _relations(self) -> facet_normals.CableSubsets:
-        # Return only the cables of each cocircuit, in the order of the block.
+        # Return only the cables of each facet normal, in the order of the block.
         table, counts = self._choices
         indices = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(indices, axis=1)
@@ -287,8 +287,7 @@ class WorkspaceSearch:
         )
 
     def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:
-        # Poses whose tensions touch limits, or nearly do: they keep limits that are wider by as much as these may be
-        # missed.
+        # Poses whose tensions touch limits, or nearly do, and keep wider limits: by as much as limits may be missed.
         low, high = self.requirement.low, self.requirement.high
         rows = np.flatnonzero(np.abs(margin) <= TOUCHED / BOUNDARY * self._boundary)
         if self._measure == "closure" or not (low.any() or np.isfinite(high).any()) or not len(rows):

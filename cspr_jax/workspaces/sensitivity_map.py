@@ -15,7 +15,7 @@ CHECK_ERROR = 1e-9
 
 
 class SensitivityMap(GridMap):
-    """The sensitivities of a robot at each place; see `GridMap`."""
+    """The sensitivities of a robot at each position; see `GridMap`."""
 
     any_cables = True
 
@@ -36,7 +36,7 @@ class SensitivityMap(GridMap):
         return self._search(positions)._asdict()
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        """Refuse positions out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -25,7 +25,7 @@ from cspr_jax.workspaces.static_poses import RestPoses
 
 # How often open cells are halved along each axis.
 DEPTH = 2
-# Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
+# Error of distances, m: far above the rounding of coordinates below 1e6 m, far below measurable distances.
 CLOSE = 1e-9
 LIMITS = {"floor_margin": "floor", "length_margin": "cable lengths", "speed_margin": "cable speeds"}
 
@@ -34,8 +34,8 @@ class RestCells:
     """Proofs, at one orientation, that whole cells lie on one side of a workspace.
 
     While a robot moves by a distance without turning, its heights and the lengths of its cables change by no more than
-    this distance; speeds of cables change as `workspaces.cells.cells.shifts` says. With an uncertainty, robots are
-    inside where all of them are, and outside where one is, and single poses are cells of no size.
+    this distance; `workspaces.cells.shifts` bounds the change of speeds of cables. With an uncertainty, a pose is
+    inside if it is so for all robots, and outside if it is so for one; single poses are cells without extent.
     """
 
     def __init__(self, poses: RestPoses, quaternion: np.ndarray, all_robots: AllRobots | None = None) -> None:

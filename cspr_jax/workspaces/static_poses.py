@@ -156,7 +156,7 @@ def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationS
     else:
         best, is_met = np.fmin.reduce, inside.all(1)
         may_be = ~is_met & (inside | is_open).all(1)
-    # The reasons of a refuted set are those of the refuted orientations, however many others are open.
+    # A refuted set has the reasons of its refuted orientations, even if others are open.
     reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
     best_values = {name: best(columns[name], axis=1) for name in MARGINS}
     at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)

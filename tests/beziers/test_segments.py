@@ -47,7 +47,7 @@ def segments(rng, count):
     return points, np.exp(rng.uniform(np.log(0.6), np.log(4.0), count))
 
 
-def judged(spools, points, times, gravity=GRAVITY, **limits):
+def results(spools, points, times, gravity=GRAVITY, **limits):
     robot = cspr_jax.point_mass(spools, mass=0.7, gravity=gravity)
     first, middle, last = np.moveaxis(points, 1, 0)
     limits = Limits(**limits) if limits else None
@@ -59,7 +59,7 @@ def compare_with_samples(rng, robots, each, samples):
     counts = [0, 0]
     for spools in triangles(rng, robots):
         points, times = segments(rng, each)
-        found = judged(spools, points, times)
+        found = results(spools, points, times)
         assert not (found.verdict == Verdict.UNDECIDED).any()
         for i in range(each):
             slack, depth = oracle.least_slack(spools, GRAVITY, points[i], times[i], samples)
@@ -114,7 +114,7 @@ def test_the_printed_rule_accepts_slack_cables():
     """(25) asks for the larger one of both inner extrema: here it accepts a segment on which a cable would push."""
     rng = np.random.default_rng(2)
     points, times = segments(rng, 1500)
-    found = judged(SPOOLS, points, times)
+    found = results(SPOOLS, points, times)
 
     def accepted(i):
         return oracle.printed_rule(SPOOLS, GRAVITY, points[i], times[i])
@@ -129,15 +129,15 @@ def test_the_printed_rule_accepts_slack_cables():
 def test_verdicts_know_no_axes_units_or_labels():
     rng = np.random.default_rng(3)
     points, times = segments(rng, 60)
-    found = judged(SPOOLS, points, times)
+    found = results(SPOOLS, points, times)
     turn = Rotation.from_euler("z", 0.7).as_matrix()
     place = np.array([3.0, -2.0, 0.4])
     cases = {
-        "turned and moved": judged(SPOOLS @ turn.T + place, points @ turn.T + place, times),
-        "labels": judged(SPOOLS[[1, 0, 2]], points, times),
-        "scale": judged(100.0 * SPOOLS, 100.0 * points, 10.0 * times),
-        "gravity": judged(SPOOLS, points, times / np.sqrt(1.7), gravity=1.7 * GRAVITY),
-        "backwards": judged(SPOOLS, points[:, ::-1], times),
+        "turned and moved": results(SPOOLS @ turn.T + place, points @ turn.T + place, times),
+        "labels": results(SPOOLS[[1, 0, 2]], points, times),
+        "scale": results(100.0 * SPOOLS, 100.0 * points, 10.0 * times),
+        "gravity": results(SPOOLS, points, times / np.sqrt(1.7), gravity=1.7 * GRAVITY),
+        "backwards": results(SPOOLS, points[:, ::-1], times),
     }
     for name, other in cases.items():
         np.testing.assert_array_equal(found.verdict, other.verdict, name)
@@ -222,9 +222,9 @@ def slack_of(name, limit, points, time, samples=4000):
 def test_limits_are_those_of_samples(name):
     rng = np.random.default_rng(5)
     points, times = segments(rng, 150)
-    taut = judged(SPOOLS, points, times)
+    taut = results(SPOOLS, points, times)
     some = np.flatnonzero((taut.verdict & Verdict.ABOVE_SPOOLS) == 0)[:60]
-    found = judged(SPOOLS, points[some], times[some], **{name: EVERY[name]})
+    found = results(SPOOLS, points[some], times[some], **{name: EVERY[name]})
     broken = 0
     for own, i in enumerate(some):
         slack = slack_of(name, EVERY[name], points[i], times[i])

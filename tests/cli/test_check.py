@@ -28,7 +28,7 @@ def test_feasible(own):
         "rest",
     )
     code, out, _ = cspr("check", own / "own.csv", "--robot", "prototype")
-    assert code == 0 and "proved to hold at every instant" in out and "a cubic spline (C2) through 4 samples" in out
+    assert code == 0 and "proved to hold at every time" in out and "a cubic spline (C2) through 4 samples" in out
 
 
 def test_not_feasible(own):

@@ -172,7 +172,7 @@ def test_turns_and_pieces_have_a_bound(tmp_path):
         caspr.read(written(tmp_path, element(points), joint="PLANAR_XZ"))
 
 
-def test_one_of_several_trajectories_is_judged(tmp_path, capsys):
+def test_one_of_several_trajectories_is_checked(tmp_path, capsys):
     """By `--trajectory`, by the key of plans and of their poses, and from Python; else their names are listed."""
     ways = {"up": [[0.1, 0, -1.0], [0.1, 0, -0.9]], "down": [[0, 0, -1.0], [0, 0.1, -1.1]]}
     elements = [

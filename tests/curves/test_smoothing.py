@@ -110,7 +110,7 @@ RECORDS = {
 @pytest.mark.parametrize("kind", ["cubic", "quintic"])
 @pytest.mark.parametrize(("decimals", "noise"), [(12, 0.0), (4, 0.0), (12, 1e-4)])
 def test_no_jolt_where_a_record_is_at_rest(name, kind, decimals, noise):
-    """The curve that is judged begins and ends at rest, and bends no more than the one through the samples."""
+    """The curve that is proved begins and ends at rest, and bends no more than the one through the samples."""
     times = np.linspace(0.0, 4.0, 201)
     exact = RECORDS[name](times)
     values = np.round(exact + noise * np.random.default_rng(1).normal(size=exact.shape), decimals)

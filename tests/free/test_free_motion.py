@@ -1,9 +1,9 @@
-"""The fastest motions between poses: closed forms, symmetries, an independent judge, and published sequences."""
+"""The fastest motions between poses: closed forms, symmetries, an independent verifier, and published sequences."""
 
 import numpy as np
 import pytest
 from oracles import any_motion, least_time_forms
-from support.free_motions import QUICK, Judged, problem_of, solve
+from support.free_motions import QUICK, PlacedMotion, problem_of, solve
 
 from cspr_jax.errors import InputError
 from cspr_jax.families.free import free_motion as free_motions
@@ -41,12 +41,12 @@ LEAST = (1.3205, 1.7040, 1.1545, 2.0059, 1.9807, 1.7390)
 
 
 def check_proved(robot, limits, free, frame, samples=501):
-    """Each segment is proved, and the judge, who shares no code with the package, finds no limit broken."""
+    """Each segment is proved, and the verifier, who shares no code with the package, finds no limit broken."""
     assert free.is_optimal
     assert free.answers.feasible.all()
     for motion in free.motions:
         instants = np.linspace(0.0, float(motion.knots[-1]), samples)
-        least = any_motion.judge(robot, limits, Judged(motion, frame)).slacks(instants)
+        least = any_motion.verifier(robot, limits, PlacedMotion(motion, frame)).slacks(instants)
         assert {name: slack.min() for name, slack in least.items() if slack.min() < -1e-9} == {}
 
 
@@ -65,10 +65,10 @@ def test_a_fall_along_the_axis_takes_little_more_than_the_closed_form():
         assert least * (1.0 - SAME) < free.duration < least * (1.0 + SLOWER)
 
 
-def test_a_motion_is_proved_and_the_judge_agrees(aside):
+def test_a_motion_is_proved_and_the_verifier_agrees(aside):
     free, frame = aside
     check_proved(RING, LIMITS, free, frame)
-    state = Judged(free.motions[0], frame).state(np.array([0.0, free.duration]))
+    state = PlacedMotion(free.motions[0], frame).state(np.array([0.0, free.duration]))
     np.testing.assert_allclose(state.position, ASIDE, atol=1e-12)
     np.testing.assert_allclose(state.velocity, 0.0, atol=1e-9)
     # Proof and tightening cost next to nothing.
@@ -104,7 +104,7 @@ def test_accelerations_at_poses_are_those_that_are_given(aside):
     given = np.array([[0.0, 0.0, 0.0], [0.4, -0.6, 0.0]])
     free, frame = solve(RING, LIMITS, ASIDE, given)
     check_proved(RING, LIMITS, free, frame)
-    state = Judged(free.motions[0], frame).state(np.array([0.0, free.duration]))
+    state = PlacedMotion(free.motions[0], frame).state(np.array([0.0, free.duration]))
     np.testing.assert_allclose(state.acceleration, given, atol=1e-9)
     assert free.duration > aside[0].duration
 
@@ -114,7 +114,7 @@ def test_segments_together_share_their_acceleration_and_lose_no_time(aside):
     places = np.array([*ASIDE, [0.1, -0.3, 1.2]])
     free, frame = solve(RING, LIMITS, places)
     check_proved(RING, LIMITS, free, frame)
-    before, after = (Judged(motion, frame) for motion in free.motions)
+    before, after = (PlacedMotion(motion, frame) for motion in free.motions)
     here, there = before.state(np.array([before.times[1]])), after.state(np.array([0.0]))
     np.testing.assert_allclose(here.acceleration, there.acceleration, atol=1e-8)
     np.testing.assert_allclose(here.velocity, 0.0, atol=1e-9)

@@ -91,7 +91,7 @@ def test_times_of_table_2_1():
 
 @pytest.mark.thorough
 def test_cells_in_space_are_what_plans_say():
-    """From rest in P0, and from another place, around the ball that is judged and not avoided."""
+    """From rest in P0, and from another position, around the ball that is checked and not avoided."""
     space = {"schema": 1, "map": "least-time", "robot": "prototype", "limits": {"tension_max": 3.0}}
     axes = {"x": [-0.5, 0.4], "y": [0.2], "z": [1.3], "z0": [1.5]}
     sweep = space | {"axes": axes, "trajectory": {"family": "free", "from": {"rest": True}}}

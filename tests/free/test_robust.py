@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from oracles import any_motion, least_time_forms
-from support.free_motions import Judged, solve
+from support.free_motions import PlacedMotion, solve
 from support.other_robots import on_balls, uncertain
 
 from cspr_jax.families.free.problem import FreeSettings
@@ -30,7 +30,7 @@ def least_slacks(robot, limits, free, frame, spools, factor, count, samples=201)
         other = robot | {"base_points": moved, "mass": robot["mass"] * factor ** (-1) ** k}
         for motion in free.motions:
             instants = np.linspace(0.0, float(motion.knots[-1]), samples)
-            slacks = any_motion.judge(other, limits, Judged(motion, frame)).slacks(instants)
+            slacks = any_motion.verifier(other, limits, PlacedMotion(motion, frame)).slacks(instants)
             least.append(min(float(np.min(slack)) for slack in slacks.values()))
     return np.array(least)
 
@@ -88,7 +88,8 @@ def test_near_the_plane_of_the_spools(fraction):
     assert least_slacks(PROTOTYPE, FAST, planned, frame, spools, 1.0, 20, 2001).max() < 0.0
     depths = [
         min(
-            Judged(m, frame).state(np.linspace(0.0, float(m.knots[-1]), 2001)).position[:, 2].min() for m in one.motions
+            PlacedMotion(m, frame).state(np.linspace(0.0, float(m.knots[-1]), 2001)).position[:, 2].min()
+            for m in one.motions
         )
         for one in (planned, free)
     ]

@@ -217,5 +217,5 @@ def test_the_proof_covers_the_largest_acceleration(law):
     known = by_formula(problem.robot, starts, ends, law=law, rule="optimum", max_acceleration=0.3)
     for factor, verdict in ((1.0 - 1e-6, Verdict.UNDECIDED), (1.0, 0)):
         timed = dataclasses.replace(known, duration=known.duration * factor)
-        judged = verdicts(problem, starts, ends, timed, law=law, max_acceleration=0.3, sharp=False)
-        assert judged.verdict[0] == verdict
+        result = verdicts(problem, starts, ends, timed, law=law, max_acceleration=0.3, sharp=False)
+        assert result.verdict[0] == verdict

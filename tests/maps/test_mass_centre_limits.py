@@ -138,7 +138,7 @@ def between(peaks):
 
 @pytest.mark.ci("minimum-arcs-False", "minimum-oscillations-False")
 @pytest.mark.parametrize(("kind", "is_turned"), cases())
-def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
+def test_motions_of_their_own_time_are_checked(tmp_path, kind, is_turned):
     keys = {"map": kind} | FIXED[kind]
     keys = turned_over(keys) if is_turned else keys
     bare = computed(tmp_path / "bare", keys)

@@ -107,7 +107,7 @@ def lies_in(inner, outer):
 def compare(case):
     """Check the proof of a case; whether it decides."""
     proof, reached, rows, start = proof_of(case)
-    expected = any_motion.judged(case.robot, case.limits, case.motion)
+    expected = any_motion.verified(case.robot, case.limits, case.motion)
     # The reference knows neither contacts, singularities nor the plane of the spools.
     known = [k for k, row in enumerate(rows) if row.flag in NAMES]
     proof = dataclasses.replace(
@@ -137,13 +137,13 @@ def compare(case):
 
 def compare_attained(case, expected, names, reached, start):
     """Smallest slacks, and those at their times, against the reference: to a millionth of the size of the criterion."""
-    judge = any_motion.judge(case.robot, case.limits, case.motion)
+    verifier = any_motion.verifier(case.robot, case.limits, case.motion)
     for name, slack in expected.slacks.items():
         columns = [k for k, other in names.items() if other == name]
         k = columns[int(np.argmin(reached.high[columns]))]
         size = 1e-6 * np.max(np.abs(case.limits.get(name, case.limits["tension_max"])))
         # The later side of a joint is at its time, the earlier one just before it.
-        sides = [judge.slacks(start + reached.when[k] + shift)[name][0] for shift in (-1e-12, 0.0, 1e-12)]
+        sides = [verifier.slacks(start + reached.when[k] + shift)[name][0] for shift in (-1e-12, 0.0, 1e-12)]
         assert abs(reached.high[k] - slack) <= size, (name, reached.high[k], slack)
         assert np.min(np.abs(sides - reached.high[k])) <= size, (name, reached.high[k], sides)
 

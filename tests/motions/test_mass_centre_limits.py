@@ -109,7 +109,7 @@ def largest(planned):
 @pytest.mark.ci("ellipse")
 @pytest.mark.thorough
 @pytest.mark.parametrize("family", families(FIXED))
-def test_motions_of_their_own_time_are_judged(family):
+def test_motions_of_their_own_time_are_checked(family):
     keys = {"schema": 1, "family": family, "samples": 2001, **FIXED[family]}
     bare = cspr_jax.plan(keys)
     assert bare.feasible
@@ -138,7 +138,7 @@ def test_motions_in_the_least_time_keep_them(family):
 
 def test_poses_at_rest_refuse_them():
     robot = cspr_jax.load_robot("prototype")
-    with pytest.raises(InputError, match=r"acceleration_max = 1\.0: must be absent where no motion is judged"):
+    with pytest.raises(InputError, match=r"acceleration_max = 1\.0: must be absent where no motion is checked"):
         limits_over(robot, cspr_jax.Limits(acceleration_max=1.0))
 
 

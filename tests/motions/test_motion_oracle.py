@@ -161,5 +161,5 @@ def test_slacks_of_limits_by_hand(sign):
         "cable_speed_max": 0.2,
         "cable_acceleration_max": 2.0 - 0.36 / 5.0,
     }
-    found = any_motion.judge(robot, limits, motion).slacks([0.0])
+    found = any_motion.verifier(robot, limits, motion).slacks([0.0])
     assert {name: value[0] for name, value in found.items()} == pytest.approx(expected, rel=1e-12)

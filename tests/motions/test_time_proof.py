@@ -222,7 +222,7 @@ def test_criteria_name_cables():
     assert (rows[6].flag, rows[6].cables, rows[6].unit) == (Verdict.BELOW_FLOOR, (), "m")
 
 
-def test_which_poses_of_a_robot_are_judged():
+def test_which_poses_a_robot_may_have():
     """The determinant of bodies, and the depth of what hangs below its spools, where the motion determines tensions."""
     both = {Verdict.SINGULAR, Verdict.ABOVE_SPOOLS}
     wanted = {

@@ -205,7 +205,7 @@ def tension_limits(robot, limits):
 
 
 @dataclasses.dataclass(frozen=True)
-class Judge:
+class Verifier:
     """Slacks of a motion under limits, each positive where it holds: N, m, m/s, m/s2."""
 
     robot: dict
@@ -239,9 +239,9 @@ class Judge:
         return np.min(list(self.slacks(times).values()), axis=0)
 
 
-def judge(robot, limits, motion):
-    """Judge of a motion."""
-    return Judge(robot, limits, motion, Centring(*tension_limits(robot, limits)))
+def verifier(robot, limits, motion):
+    """Verifier of a motion."""
+    return Verifier(robot, limits, motion, Centring(*tension_limits(robot, limits)))
 
 
 def refined(function, times, values, rounds=4, parts=20):
@@ -296,7 +296,7 @@ def smallest(function, times, values, candidates=3, rounds=5, parts=10):
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgement:
+class Verification:
     """Smallest slack of each criterion, and the intervals (k, 2) in which one is negative, s."""
 
     slacks: dict
@@ -308,10 +308,10 @@ class Judgement:
         return not len(self.failing)
 
 
-def judged(robot, limits, motion, samples=SAMPLES):
-    """Judgement of a motion from samples, refined where slacks are small."""
-    judge_ = judge(robot, limits, motion)
+def verified(robot, limits, motion, samples=SAMPLES):
+    """Verification of a motion from samples, refined where slacks are small."""
+    verifier_ = verifier(robot, limits, motion)
     times = np.linspace(*motion.times, samples)
-    values = judge_.slacks(times)
-    least = {n: smallest(lambda t, n=n: judge_.slacks(t)[n], times, v) for n, v in values.items()}
-    return Judgement(least, failing(judge_.least, times, np.min(list(values.values()), axis=0)))
+    values = verifier_.slacks(times)
+    least = {n: smallest(lambda t, n=n: verifier_.slacks(t)[n], times, v) for n, v in values.items()}
+    return Verification(least, failing(verifier_.least, times, np.min(list(values.values()), axis=0)))

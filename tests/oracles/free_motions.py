@@ -235,7 +235,7 @@ def integrated(robot, start, end, time, accelerations):
 
 
 def motion(robot, start, end, time, nodes):
-    """The motion of nodes, for any judge."""
+    """The motion of nodes, for any verifier."""
     spline, moving = cubics(time, nodes), coordinates(robot)
     whole = np.zeros((*spline.coefficients.shape[:2], 6))
     whole[:, 0, :3] = start.position

@@ -221,7 +221,7 @@ def optimum(problem_, solution, rounds=15, gap=1e-6):
 
 
 class ByTensions:
-    """The same problem with the tensions as unknowns: HiGHS at each cell. It knows no cocircuits."""
+    """The same problem with the tensions as unknowns: HiGHS at each cell. It knows no facet normals."""
 
     def __init__(self, robot, limits, path, count=50, scheme="interpolation", ends=(0.0, 0.0), sides=path_rows.SIDES):
         self.robot, self.limits, self.path, self.ends = robot, limits, path, ends

@@ -1,4 +1,4 @@
-"""NumPy reference that judges motions along paths, and bounds the least time of a path from both sides.
+"""NumPy reference that verifies motions along paths, and bounds the least time of a path from both sides.
 
 From above: a motion whose limits hold at the nodes and between, from the grid's problem with rows that are tightened
 where points between the nodes break them. From below: what any motion must meet on the whole of a cell. There, with
@@ -66,8 +66,8 @@ class Timed:
 def slacks(robot, limits, motion, times):
     """Slacks of all limits at times, dict of (k,): by linear programs, or by solving where n = dof. SI units."""
     low, high = path_rows.tension_range(robot, limits)
-    judge = any_motion.Judge(robot, limits, motion, any_motion.Centring(low, high))
-    made, state = judge.slacks(times), motion.state(np.atleast_1d(times))
+    verifier = any_motion.Verifier(robot, limits, motion, any_motion.Centring(low, high))
+    made, state = verifier.slacks(times), motion.state(np.atleast_1d(times))
     if np.isinf(high).all() and not np.isfinite(low).any():
         del made["tension"]
     for name, part in (("speed_max", state.velocity), ("acceleration_max", state.acceleration)):

@@ -1,4 +1,4 @@
-"""The reference for free motions: its bounds and judge against closed forms, and its answers where casadi is."""
+"""The reference for free motions: its bounds and verifier against closed forms, and its answers where casadi is."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ from oracles import (
     free_motion_times,
     free_motions,
     least_time_forms,
-    motion_judge,
+    motion_verifier,
     sampled_motion,
 )
 
@@ -62,8 +62,10 @@ def test_references_are_met_and_above_the_bounds(name):
     assert 0.0 < known.below < known.infimum < known.time < 1.012 * known.infimum
     assert 1 <= known.agreeing <= known.starts
     sides = case.start, case.end
-    judgement = motion_judge.judged(case.robot, case.limits, known.motion.state, known.time, *sides, samples=1501)
-    assert judgement.faults(near=1e-5) == []
+    verification = motion_verifier.verified(
+        case.robot, case.limits, known.motion.state, known.time, *sides, samples=1501
+    )
+    assert verification.faults(near=1e-5) == []
     reach = free_motion_bounds.Reach(case.robot, case.limits, *sides)
     assert not reach.refutes(known.time)
 
@@ -107,30 +109,30 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_the_judge_sees_faults(fault):
+def test_the_verifier_sees_faults(fault):
     known = free_motion_times.reference("3R3T-6 0 inside")
     sides = known.case.robot, known.case.limits
     state = changed(known.motion, **FAULTS[fault])
-    faults = motion_judge.judged(*sides, state, known.time, known.case.start, known.case.end, 1501).faults()
+    faults = motion_verifier.verified(*sides, state, known.time, known.case.start, known.case.end, 1501).faults()
     assert any(text.startswith(fault + ":") for text in faults), faults
 
 
 @pytest.mark.parametrize("limit, fraction", [("tension_max", 0.9999), ("cable_speed_max", 0.9999)])
-def test_the_judge_sees_limits_that_are_touched(limit, fraction):
+def test_the_verifier_sees_limits_that_are_touched(limit, fraction):
     """The fastest motions are on their limits: a smaller one is broken."""
     known = free_motion_times.reference("segment 1")
     limits = {**known.case.limits, limit: fraction * known.case.limits[limit]}
     sides = known.time, known.case.start, known.case.end
-    faults = motion_judge.judged(known.case.robot, limits, known.motion.state, *sides, samples=1501).faults()
+    faults = motion_verifier.verified(known.case.robot, limits, known.motion.state, *sides, samples=1501).faults()
     name = "tension" if limit.startswith("tension") else limit
     assert any(text.startswith(f"limit {name}") for text in faults), faults
 
 
-def test_the_judge_sees_a_motion_above_the_spools():
+def test_the_verifier_sees_a_motion_above_the_spools():
     known = free_motion_times.reference("segment 4")
     lower = {**known.case.robot, "base_points": known.case.robot["base_points"] + [0.0, 0.0, 0.5]}
     sides = known.motion.state, known.time, known.case.start, known.case.end
-    assert any(text.startswith("depth") for text in motion_judge.judged(lower, {}, *sides, samples=501).faults())
+    assert any(text.startswith("depth") for text in motion_verifier.verified(lower, {}, *sides, samples=501).faults())
 
 
 @pytest.fixture(scope="module")

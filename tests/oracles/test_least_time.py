@@ -140,7 +140,7 @@ def test_bounds_enclose_the_estimate(kind, fraction, cases):
         assert slack.min() > -1e-4 * (weight if name == "tension" else np.max(case.limits[name])), name
 
 
-def test_the_judge_sees_a_motion_that_is_too_fast(cases):
+def test_the_verifier_sees_a_motion_that_is_too_fast(cases):
     case = cases["3R3T-7"]
     motion, _ = least_time_bounds.above(case.robot, case.limits, case.path, 100)
     faster = least_time_bounds.Timed(motion.path, motion.nodes, 1.05 * motion.x)

@@ -2,7 +2,7 @@
 
 z up, SI units.  W t = w: column i of W (d, n) is what one newton in cable i does to the platform, w what all cables
 together have to do, m (a - g) and the moment.  Tension margins are solved as linear programs, closure by two more ways,
-and everything a second time from the cocircuits, the vectors of minimal support in the row space of W.  Points: (3,) m.
+and everything a second time from the facet normals, vectors of minimal support in the row space of W.  Points: (3,) m.
 A definition over orientations takes margin(position, rotation) of one pose, which belongs where it is not negative.
 """
 
@@ -19,7 +19,7 @@ PATTERNS = ("1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R")
 _ROWS = {"1T": [2], "2T": [0, 2], "3T": [0, 1, 2], "1R2T": [0, 2, 4], "3R3T": [*range(6)], "3R": [3, 4, 5]}
 RANK = 1e-9  # singular values below this, of the largest, are zero
 NOTHING = 1e-14  # and those below this: lines through a joint leave rounding only
-ZERO = 1e-10  # entries of cocircuits below this, of the largest, are zero
+ZERO = 1e-10  # entries of facet normals below this, of the largest, are zero
 OUTSIDE = 1e-9  # of a wrench: what may lie outside of the span
 
 
@@ -176,7 +176,7 @@ def facet_normals(matrix: Array) -> tuple[Array, Array]:
 
 
 def _slacks(matrix: Array, wrenches: Array, shape: Array, low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
-    # Per cocircuit the distance from its plane times |c|, inf where void, at the worst wrench; and the cocircuits.
+    # Per facet normal the distance from its plane times |c|, inf where void, at the worst wrench; and the normals.
     low, high = _bounds(matrix, low, high)
     c, y = facet_normals(matrix)
     with np.errstate(invalid="ignore"):
@@ -187,7 +187,7 @@ def _slacks(matrix: Array, wrenches: Array, shape: Array, low: ArrayLike, high: 
 def margin_by_facets(matrix: Array, wrenches: ArrayLike, low, high, shape: ArrayLike | None = None) -> float:
     """Margin (N) by duality, exact also for w + shape e, |e| <= 1: wrenches (k, d) or (d,), shape (d, k).
 
-    No margin is larger than half of a cable's range; beside that the cocircuits decide.
+    No margin is larger than half of a cable's range; beside that the facet normals decide.
     """
     wrenches = np.atleast_2d(np.asarray(wrenches, float))
     shape = np.zeros((len(matrix), 1)) if shape is None else np.asarray(shape, float)
@@ -240,8 +240,8 @@ def is_closed(matrix: Array, tolerance: float = 1e-9) -> bool:
     return bool(nnls(np.vstack([null, np.ones(n)]), np.r_[np.zeros(len(null)), 1.0])[1] > tolerance)
 
 
-def closed_by_cocircuits(matrix: Array) -> bool:
-    """Full rank, and every cocircuit has entries of both signs."""
+def closed_by_facet_normals(matrix: Array) -> bool:
+    """Full rank, and every facet normal has entries of both signs."""
     y = facet_normals(matrix)[1]
     return bool(rank_of(matrix) == len(matrix) and np.all((y > 0.0).any(1)))
 

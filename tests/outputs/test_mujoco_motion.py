@@ -1,4 +1,4 @@
-"""MuJoCo judges the motions of a platform: the tensions that it asks for, and where ours take it."""
+"""MuJoCo checks the motions of a platform: the tensions that it asks for, and where ours take it."""
 
 from typing import NamedTuple
 

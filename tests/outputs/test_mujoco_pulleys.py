@@ -1,4 +1,4 @@
-"""MuJoCo judges cables over pulleys: their lengths, the tensions that it asks for, and where ours take it."""
+"""MuJoCo checks cables over pulleys: their lengths, the tensions that it asks for, and where ours take it."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Tables that are too long to be held: judged window by window as they are as a whole; nothing is written of them."""
+"""Tables that are too long to be held: checked window by window as they are as a whole; nothing is written of them."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def table(tmp_path, monkeypatch):
     return path, whole
 
 
-def test_windows_are_judged_as_the_whole(table):
+def test_windows_are_checked_as_the_whole(table):
     path, whole = table
     check = cspr_jax.check("prototype", path, limits=LIMITS)
     assert check.verdict == whole.verdict == "cable_too_fast" and check.plan.legs[0].motions == []

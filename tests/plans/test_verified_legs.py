@@ -1,4 +1,4 @@
-"""Families that know neither obstacles nor pulleys: their motions are judged with both, here beside dense samples."""
+"""Families that know neither obstacles nor pulleys: their motions are proved with both, here beside dense samples."""
 
 import numpy as np
 import pytest

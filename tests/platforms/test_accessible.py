@@ -251,9 +251,9 @@ def test_a_dip_beside_a_singularity():
     rotated = from_tilt_torsion(angles[0] + np.array([math.pi / 2.0, 0.0, 0.0]))
     way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], rotated)
     segment = oracle.Segment(*way, amplitude=oracle.effective_c3(0.1))
-    judged = {p: oracle.check_motion(MSSM, segment, p, tuple(found.beta_hat[0]), 20001) for p in (4, 5)}
-    assert judged[4]["mu_hat_min"] < -0.5 and judged[5]["feasible"]
-    assert found.arcs[0] == 5 and found.margin[0] == pytest.approx(judged[5]["mu_hat_min"], abs=1e-4)
+    checked = {p: oracle.check_motion(MSSM, segment, p, tuple(found.beta_hat[0]), 20001) for p in (4, 5)}
+    assert checked[4]["mu_hat_min"] < -0.5 and checked[5]["feasible"]
+    assert found.arcs[0] == 5 and found.margin[0] == pytest.approx(checked[5]["mu_hat_min"], abs=1e-4)
 
 
 @pytest.mark.soak
@@ -279,7 +279,7 @@ def test_verdicts_are_the_oracle_s():
                 for value in values[i][~np.isnan(values[i])]:
                     # What the oracle's few samples let pass is looked at with many.
                     if oracle.check_motion(MSSM, segment, fewer, (-1.0, value), 301)["feasible"]:
-                        judged = oracle.check_motion(MSSM, segment, fewer, (-1.0, value), 40001)
-                        close += judged["feasible"]
-                        assert not judged["feasible"] or judged["mu_hat_min"] < 1e-4, (radius, i, fewer, value)
+                        checked = oracle.check_motion(MSSM, segment, fewer, (-1.0, value), 40001)
+                        close += checked["feasible"]
+                        assert not checked["feasible"] or checked["mu_hat_min"] < 1e-4, (radius, i, fewer, value)
     assert close < 3 and 1500 < attained < 2000

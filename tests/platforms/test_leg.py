@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from oracles import platform as oracle
 from support.commands import cspr, plan
 from support.platforms import (
+    CHECKED,
     FROM_REST,
-    JUDGED,
     MSSM,
     SHORT,
     Z0,
@@ -243,8 +243,8 @@ def test_limits_of_a_platform():
         "cable_speed_max": np.abs(speeds).max(),
         "cable_acceleration_max": np.abs(bends).max(),
     }
-    loose = {row.name: values[row.name] * (2.0 if row.sense == "most" else 0.5) for row in JUDGED}
-    for row in JUDGED:
+    loose = {row.name: values[row.name] * (2.0 if row.sense == "most" else 0.5) for row in CHECKED}
+    for row in CHECKED:
         for factor, broken in ((0.999, row.sense == "most"), (1.001, row.sense == "least")):
             limits = limits_of(**loose | {row.name: values[row.name] * factor})
             found = checked(checker_of(kind=FROM_REST, limits=limits), [(start, end, (-1.0, -1.0), 5)])

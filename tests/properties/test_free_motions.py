@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from oracles import free_motion_times, motion_judge
+from oracles import free_motion_times, motion_verifier
 from support.free_motions import problem_of
 from support.least_time import sampled_states
 
@@ -47,5 +47,5 @@ def test_times_are_those_of_collocation(name):
     assert free.duration <= (1.0 + ABOVE) * reference.time
     assert bound <= reference.infimum
     motion = partial(sampled_states, Placed(free.motions[0], frame))
-    judged = motion_judge.judged(case.robot, case.limits, motion, free.duration, *ends, samples=5_001)
-    assert judged.faults() == []
+    verification = motion_verifier.verified(case.robot, case.limits, motion, free.duration, *ends, samples=5_001)
+    assert verification.faults() == []

@@ -28,7 +28,7 @@ THOROUGH = [(kind, 1, k % 2 == 0) for k, kind in enumerate(least_time_cases.KIND
 
 
 class Called:
-    """A motion as the judge takes it."""
+    """A motion as the verifier takes it."""
 
     def __init__(self, motion):
         self.state = motion

@@ -29,12 +29,12 @@ def balances(dof: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, n
 
 @jax.jit
 @partial(jax.vmap, in_axes=(0, 0, None, None))
-def JUDGED(matrix, wrench, low, high):
+def FACES(matrix, wrench, low, high):
     return nearest_face(matrix, wrench, low, high), centred(matrix, wrench, low, high)[1]
 
 
-def judged(*arguments):
-    return jax.tree.map(np.asarray, JUDGED(*arguments))
+def results(*arguments):
+    return jax.tree.map(np.asarray, FACES(*arguments))
 
 
 SHAPES = [(2, 3), (3, 5), (3, 8), (6, 8), *(pytest.param(6, n, marks=pytest.mark.thorough) for n in (7, 10))]
@@ -46,7 +46,7 @@ def test_tensions_are_most_central(dof, count):
     matrices, wrenches, _ = balances(dof, count, count)
     for top in (25.0, np.inf):
         low, high = np.full(count, 1.0), np.full(count, top)
-        face, largest = judged(matrices, wrenches, low, high)
+        face, largest = results(matrices, wrenches, low, high)
         np.testing.assert_allclose(np.einsum("kij,kj->ki", matrices, face.tensions), wrenches, atol=1e-7)
         margin = np.minimum(face.tensions - low, high - face.tensions).min(1)
         bounded = np.isfinite(largest)
@@ -60,7 +60,7 @@ def test_cable_beside_the_face():
     """Two cables in line, and one that no wrench without change concerns."""
     matrix, wrench = np.array([[[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]]), np.array([[2.0, 7.0]])
     cases = (np.repeat(x, COUNT, axis=0) for x in (matrix, wrench))
-    face, largest = judged(*cases, np.full(3, 1.0), np.full(3, 9.0))
+    face, largest = results(*cases, np.full(3, 1.0), np.full(3, 9.0))
     np.testing.assert_allclose(face.tensions[0], [7.0, 5.0, 7.0], atol=1e-12)
     assert largest[0] == pytest.approx(2.0)
 
@@ -69,7 +69,7 @@ def test_ranges_of_cables_differ():
     """Where one cable has less range than the faces leave, tensions are within limits wherever any are."""
     matrices, wrenches, _ = balances(3, 5, 5)
     low, high = np.full(5, 1.0), np.array([4.0, 60.0, 40.0, 50.0, 45.0])
-    face, largest = judged(matrices, wrenches, low, high)
+    face, largest = results(matrices, wrenches, low, high)
     margin = np.minimum(face.tensions - low, high - face.tensions).min(1)
     assert (largest == 1.5).mean() > 0.1
     np.testing.assert_array_equal(margin > 0.0, largest > 0.0)

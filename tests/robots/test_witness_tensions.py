@@ -59,7 +59,7 @@ def BOUNDS(robot, limits, states):
     return jax.vmap(one)(states)
 
 
-def judged(name: str, seed: int, count: int, low: float, high: float, *, parabolas: bool = False):
+def results(name: str, seed: int, count: int, low: float, high: float, *, parabolas: bool = False):
     """Exact balances at instants of random blocks, and the bounds of these blocks."""
     robot = centred(cspr_jax.load_robot(name))[0]
     middle, size, tilt = ROBOTS[name]
@@ -107,7 +107,7 @@ EACH = [
 def test_bounds_of_cables_and_balances(name, parabolas):
     for seed in range(3):
         for count in (12, 78):
-            instants, found = judged(name, seed, count, 0.0, np.inf, parabolas=parabolas)
+            instants, found = results(name, seed, count, 0.0, np.inf, parabolas=parabolas)
             for values, band in zip(instants, found[:5], strict=True):
                 s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
                 curve = band.square[:, None] * s**2 if parabolas else 0.0
@@ -123,7 +123,7 @@ def test_margins_of_tensions_against_highs(name, high, parabolas):
     proved = 0
     for seed in range(2):
         low, top = 1.0 * scale, high * scale
-        instants, found = judged(name, seed, 42 if parabolas else 40, low, top, parabolas=parabolas)
+        instants, found = results(name, seed, 42 if parabolas else 40, low, top, parabolas=parabolas)
         matrices, wrenches, tensions = *instants[3:], found[5]
         for i in range(0, 40, 3):
             exact = [largest_distance(matrices[i, j], wrenches[i, j], low, top) for j in (0, 4, 8)]
@@ -139,7 +139,7 @@ def test_margins_of_tensions_against_highs(name, high, parabolas):
 @pytest.mark.parametrize("name", ["prototype", "laval-mssm"])
 def test_the_only_tensions(name, parabolas):
     """On as many cables as components the bounds hold the tensions themselves."""
-    instants, found = judged(name, 4, 78, 0.0, np.inf, parabolas=parabolas)
+    instants, found = results(name, 4, 78, 0.0, np.inf, parabolas=parabolas)
     matrices, wrenches, tensions = *instants[3:], found[5]
     exact = np.linalg.solve(matrices, wrenches[..., None])[..., 0]
     over = exact - tensions.tension.middle[:, None] - tensions.tension.linear[:, None] * S[:, None]
@@ -168,7 +168,7 @@ def test_wide_bounds_hold_the_quotients_at_their_ends(pull, load):
 def test_how_fast_bounds_of_tensions_shrink(parabolas, least, most):
     """With the square of the length of a block around lines, with the third power around parabolas."""
     radii = [
-        np.nanmedian(judged("prototype", 4, count, 0.0, np.inf, parabolas=parabolas)[1][5].tension.radius)
+        np.nanmedian(results("prototype", 4, count, 0.0, np.inf, parabolas=parabolas)[1][5].tension.radius)
         for count in (120, 240)
     ]
     assert least < radii[0] / radii[1] < most

@@ -20,8 +20,8 @@ from support.least_time import robot_of
 QUICK = FreeSettings(intervals=12, samples=3)
 
 
-class Judged:
-    """A motion as the judge takes it, in the axes of the robot."""
+class PlacedMotion:
+    """A motion as the verifier takes it, in the axes of the robot."""
 
     def __init__(self, motion, frame):
         self.motion, self.frame, self.times = motion, frame, (0.0, float(motion.knots[-1]))

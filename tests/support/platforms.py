@@ -31,8 +31,8 @@ FROM_REST = PlatformMotionKind(from_rest=True)
 EFFECTIVE = named("effective-c3", 0.1)
 INSTANTS = 64
 # Every limit, so far off that none is broken: which limits there are is known when a function is compiled.
-JUDGED = [row for row in LIMITS if not row.of_mass_centre]
-LOOSE = {row.name: 0.0 if row.sense == "least" else 1e3 for row in JUDGED}
+CHECKED = [row for row in LIMITS if not row.of_mass_centre]
+LOOSE = {row.name: 0.0 if row.sense == "least" else 1e3 for row in CHECKED}
 HEAD, *PARTS = (Path(__file__).parents[2] / "sweeps" / "table_3_2.toml").read_text("utf-8").split("[[pose]]\n")
 # A plan: rest, the last pose of Table 3.2, rest.
 SHORT = "[[pose]]\n".join([HEAD, PARTS[0], PARTS[-2], PARTS[-1]])

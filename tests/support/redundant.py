@@ -1,4 +1,4 @@
-"""Point masses on more cables than degrees of freedom, judged at instants by the oracle of any motion."""
+"""Point masses on more cables than degrees of freedom, checked at instants by the oracle of any motion."""
 
 import numpy as np
 from oracles import any_motion

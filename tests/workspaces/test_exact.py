@@ -52,7 +52,7 @@ def wall(shift):
     return platform_robot(base, ends, mass=2.0, gravity=G, z_axis="up", inertia=ROUND)
 
 
-def test_spools_in_a_plane_hide_no_cocircuits():
+def test_spools_in_a_plane_hide_no_facet_normals():
     """What vanishes in the plane of the spools does not vanish elsewhere: the same choices as of spools beside it."""
     found = []
     for shift in (0.0, 1e-3):

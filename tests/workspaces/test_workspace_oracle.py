@@ -39,7 +39,7 @@ def agree(robot, rng):
     margin = oracle.tension_margin(matrix, held, robot.low, robot.high)
     assert same(margin, oracle.margin_by_facets(matrix, held, robot.low, robot.high), scale), robot.name
     closed = oracle.is_closed(matrix)
-    assert closed == oracle.closed_by_cocircuits(matrix) == (oracle.closure_margin(matrix) > 1e-9), robot.name
+    assert closed == oracle.closed_by_facet_normals(matrix) == (oracle.closure_margin(matrix) > 1e-9), robot.name
     free = oracle.tension_margin(matrix, held, 0.0, np.inf)
     assert oracle.is_static(matrix, held) == (free >= -1e-12 * scale), robot.name
     if oracle.rank_of(matrix) == len(matrix):
@@ -105,8 +105,8 @@ def test_two_opposite_cables():
     assert oracle.is_closed(matrix) and oracle.closure_margin(matrix) == pytest.approx(1.0)
 
 
-def test_the_narrowest_range_bounds_the_margin_beside_the_cocircuits():
-    """The least over cocircuits alone would be half of the mean range, 57.5 N, where the wrench is in the middle."""
+def test_the_narrowest_range_bounds_the_margin_beside_the_facet_normals():
+    """The least over facet normals alone would be half of the mean range, 57.5 N, where the wrench is in the middle."""
     matrix = np.array([[1.0, -1.0]])
     low, high = np.array([1.0, 1.0]), np.array([200.0, 32.0])
     middle = matrix @ (low + high) / 2.0
@@ -134,7 +134,7 @@ def test_a_cross_is_closed_though_its_null_vectors_come_in_pairs():
     null = np.linalg.svd(matrix)[2][2:].T
     products = null[:, None, 0] * null[None, :, 1] - null[:, None, 1] * null[None, :, 0]
     assert max(np.delete(products[i], i).min() for i in range(4)) < 1e-12  # though all are in a half plane
-    assert oracle.is_closed(matrix) and oracle.closed_by_cocircuits(matrix)
+    assert oracle.is_closed(matrix) and oracle.closed_by_facet_normals(matrix)
     assert oracle.closure_margin(matrix) == pytest.approx(1.0)
 
 
@@ -243,7 +243,7 @@ def test_a_mass_level_with_its_spools_jumps():
     base = np.array([[1, 0, 1], [0, 1, 1], [-1, 0, 1], [0, -1, 1], [0, 0, -1]], float)
     for lower in (0.0, 1e-6):
         matrix = point(base, [0.1, 0.2, 1.0 - lower])
-        assert oracle.is_closed(matrix) == oracle.closed_by_cocircuits(matrix) == (lower > 0.0)
+        assert oracle.is_closed(matrix) == oracle.closed_by_facet_normals(matrix) == (lower > 0.0)
         for margin in (oracle.tension_margin, oracle.margin_by_facets):
             found = margin(matrix, [0.0, 0.0, G], 0.0, np.inf)
             assert found == np.inf if lower else found < -0.99 * G

@@ -95,7 +95,7 @@ def rules_of(function: Callable[..., Any]) -> dict[str, Rule]:
 
 
 def rule_of(kind: Any) -> Rule:
-    """Rule of a type: that of `Annotated`, else by its name; of a union that of its last member."""
+    """Rule of a type: that of `Annotated`, that of the last member of a union, else the one for its name."""
     if get_origin(kind) in (Union, types.UnionType):
         parts = [part for part in get_args(kind) if part is not type(None)]
         return or_none(rule_of(parts[-1])) if len(parts) < len(get_args(kind)) else rule_of(parts[-1])

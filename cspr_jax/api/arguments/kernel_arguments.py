@@ -67,7 +67,7 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
 
 
 def warn_of_rest(robot: Any, key: str, position: Any, z0: Any, cure: str) -> None:
-    """Warn of a place that differs from P0 only in its last digits."""
+    """Warn of a position that differs from P0 only in its last digits."""
     if np.shape(position) == (3,) and np.shape(z0) == ():
         line = almost_at_rest(key, np.asarray(position, float).tolist(), float(z0), robot, cure)
         if line:
@@ -108,7 +108,7 @@ def depths(z0, count: int) -> Float[np.ndarray, "count"]:
 
 
 def release_ranges(x, y, z) -> list:
-    """Ranges of places of release."""
+    """Ranges of the position of release."""
     for name, values in {"release_x": x, "release_y": y, "release_z": z}.items():
         if values is not None and not values[0] <= values[1]:
             raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")

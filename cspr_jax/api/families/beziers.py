@@ -199,12 +199,12 @@ def launch_range(
     population: Population = POPULATION,
     limits: Limits | None = None,
 ) -> LaunchRange:
-    """Launches of least speed to landing places, by one Bezier segment from rest, launch paper (26) and (29).
+    """Launches of least speed to landing points, by one Bezier segment from rest, launch paper (26) and (29).
 
     Args:
         robot: a point mass on three cables, or on two in a plane; or on more.
-        targets: (n, 3) landing places in the robot's axes, m.
-        start: (3,) or (n, 3) places where the segments start at rest, in the robot's axes, m.
+        targets: (n, 3) landing points in the robot's axes, m.
+        start: (3,) or (n, 3) positions where the segments start at rest, in the robot's axes, m.
         release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
             the spools.
         release_y: least and largest y of the release, m; None: as for x.

@@ -43,18 +43,18 @@ def ellipse(
     Args:
         robot: a point mass on any number of cables.
         centre: (3,) in the robot's axes, m.
-        a: (3,) from the centre to the place at the angle 0, m.
-        b: (3,) from the centre to the place a quarter of a turn later, m; zeros: to and fro along a line.
+        a: (3,) from the centre to the point at the angle 0, m.
+        b: (3,) from the centre to the point a quarter of a turn later, m; zeros: to and fro along a line.
         frequency: () rad/s, or "natural", "best" (largest margin), "fastest" or "slowest" (within all limits).
         phase: () angle at the start, rad.
         turns: () number of turns.
         limits: override those of the robot, for "fastest" and "slowest"; None: those of the robot.
 
     Returns:
-        the motion, in the robot's axes; what jax traces may be all but a frequency in words.
+        the motion, in the robot's axes; jax may trace all arguments except a frequency in words.
 
     Raises:
-        InputError: the wrong kind of robot, y not 0 on a planar one, or a word that no frequency answers to.
+        InputError: the wrong kind of robot, y not 0 on a planar one, or a word for which there is no frequency.
     """
     _check_robot(robot, centre=centre, a=a, b=b)
     prepared_robot, frame = prepared(robot, pulleys=True)
@@ -74,8 +74,8 @@ def ellipse_frequencies(robot: PointMassRobot, centres: Points, a: PointOrPoints
     Args:
         robot: a point mass on spools in one plane, on two or more cables.
         centres: (n, 3) in the robot's axes, m.
-        a: (3,) or (n, 3) from the centre to the place at the angle 0, m.
-        b: (3,) or (n, 3) from the centre to the place a quarter of a turn later, m.
+        a: (3,) or (n, 3) from the centre to the point at the angle 0, m.
+        b: (3,) or (n, 3) from the centre to the point a quarter of a turn later, m.
 
     Returns:
         for each ellipse its open intervals, (k, 2) rad/s: k is 0 where no frequency is feasible, else 1; the upper end
@@ -103,8 +103,8 @@ def ellipse_margins(
     Args:
         robot: a point mass on spools in one plane, on two or more cables.
         centres: (n, 3) in the robot's axes, m.
-        a: (3,) or (n, 3) from the centre to the place at the angle 0, m.
-        b: (3,) or (n, 3) from the centre to the place a quarter of a turn later, m.
+        a: (3,) or (n, 3) from the centre to the point at the angle 0, m.
+        b: (3,) or (n, 3) from the centre to the point a quarter of a turn later, m.
         frequencies: () or (n,) rad/s.
 
     Returns:

@@ -272,7 +272,7 @@ def _is_finite(numbers: Array) -> bool:
 
 @checked(traced=True)
 def slacks(problem: Problem, motion: Motion, tau: Tau) -> Array:
-    """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
+    """Slacks of all criteria at one time of a motion: taut cables, determinant, depth, limits.
 
     Args:
         problem: a problem of `make_problem`, with the motion's robot.
@@ -287,14 +287,14 @@ def slacks(problem: Problem, motion: Motion, tau: Tau) -> Array:
 
 @checked(traced=True)
 def sampled_margin(problem: Problem, motion: Motion, samples: Samples = 64) -> Array:
-    """Smallest slack at equidistant instants of a motion; it can be differentiated.
+    """Smallest slack at equidistant times of a motion; it can be differentiated.
 
     If it is positive, no sample refutes the motion, but nothing is proved: searches prove feasibility.
 
     Args:
         problem: a problem of `make_problem`, with the motion's robot.
         motion: as in `slacks`.
-        samples: number of intervals between instants, ends included.
+        samples: number of intervals between the times, ends included.
 
     Returns:
         () without a unit.
@@ -303,7 +303,7 @@ def sampled_margin(problem: Problem, motion: Motion, samples: Samples = 64) -> A
 
 
 def _inward_positions(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
-    # In the kernels' axes. Of what jax traces nobody knows where it is.
+    # In the kernels' axes. Nothing warns of positions that jax traces, since they have no values yet.
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((robot, start, end, z0))):
         if start is not None:
             warn_of_rest(robot, "start", start, z0, "start = None")

@@ -57,8 +57,8 @@ def minimum_pose_arcs(  # noqa: PLR0913
     """Smallest number of arcs of a platform to each of many poses, thesis chapter 3.
 
     Args:
-        robot: a platform on six cables or more; on more the margin is the distance of all tensions from their limits
-            over the weight a cable, searches look at samples, and what they choose is proved.
+        robot: a platform on six cables or more. On more than six the margin is how far all tensions can keep from their
+            limits, over weight / n_cables; searches use samples, and the motion that they choose is proved.
         positions: (n, 3) positions of the mass centre in the robot's axes, m.
         orientations: (n, 4) unit quaternions in the robot's axes, scalar first, from the reference orientation; None:
             this one.
@@ -113,21 +113,21 @@ def _motions(
 def accessible(
     robot: PlatformRobot, place: Point, *, definition: Definition = "scan", divisions: Divisions = 32
 ) -> Accessible:
-    """Accessible orientations of a place, which free ways join with the reference orientation, section 3.11.
+    """Accessible orientations at a position: free paths lead to them from the reference orientation, section 3.11.
 
     Args:
         robot: a rigid platform; on more than six cables orientations are accessible by steps of full rank without
             contacts.
-        place: (3,) place of the mass centre in the robot's axes, m.
+        place: (3,) position of the mass centre in the robot's axes, m.
         definition: how the set is sampled, as in [orientations] of a sweep file.
         divisions: number of steps in pi: the step of the angles is pi / divisions; even, 4 to 128.
 
     Returns:
-        `angles` (n, 3) of tilt and torsion in the cylindrical frame of the place, rad; `volume` (n,), the part of SO(3)
-        that each orientation stands for.
+        `angles` (n, 3) of tilt and torsion in the cylindrical frame of the position, rad; `volume` (n,), the fraction
+        of SO(3) that each orientation stands for.
 
     Raises:
-        InputError: the wrong kind of robot, a place that is not finite, or a wrong definition or divisions.
+        InputError: the wrong kind of robot, a position that is not finite, or a wrong definition or divisions.
     """
     problem, where = _of_place(robot, place, definition, divisions)
     with double_precision():
@@ -146,12 +146,12 @@ def attainable(
     limits: Limits | None = None,
     max_arcs: MaxArcs = 30,
 ) -> tuple[Accessible, PlatformMotionAnswers]:
-    """Search the accessible orientations of a place that a motion from rest attains, section 3.12.3.
+    """Search the accessible orientations at a position that a motion from rest attains, section 3.12.3.
 
     Args:
         robot: a rigid platform, as in `accessible`.
-        place: (3,) place of the mass centre in the robot's axes, m.
-        z0: depth of P0 below the centroid of the spools, m; None: the depth of the place.
+        place: (3,) position of the mass centre in the robot's axes, m.
+        z0: depth of P0 below the centroid of the spools, m; None: the depth of the position.
         definition: as in `accessible`.
         divisions: as in `accessible`.
         amplitude: name of an amplitude function, or the function; it must meet (2.49).

@@ -96,8 +96,8 @@ def minimum_arcs(
     """Smallest number of arcs to each of many targets, with duration, margin and verdict.
 
     Args:
-        robot: a point mass on three cables or more; on more the margin is the distance of all tensions from their
-            limits over the weight a cable.
+        robot: a point mass on three cables or more; on more than three the margin is how far all tensions can keep from
+            their limits, over weight / n_cables.
         targets: (n, 3) targets in the robot's axes, m.
         start: (3,) or (n, 3) start points in the robot's axes, m; None: at rest in P0. A start is also at rest in P0 if
             its distance from P0 is within 1e-9 of the robot's size (the largest distance of a spool from their

@@ -1,4 +1,4 @@
-"""Launches from swings to many landing places, from Python."""
+"""Launches from swings to many landing points, from Python."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def swing_range(
     release_z: ReleaseRange = None,
     limits: Limits | None = None,
 ) -> SwingRange:
-    """Launches of least speed to landing places, from ellipses about places of rest at their natural frequencies.
+    """Launches of least speed to landing points, from ellipses about positions of rest, at their natural frequencies.
 
     Args:
         robot: a point mass on spools in one plane, on any number of cables.
-        targets: (n, 3) landing places in the robot's axes, m.
+        targets: (n, 3) landing points in the robot's axes, m.
         start: (3,) or (n, 3) centres of the ellipses, where the robot rests before, in the robot's axes, m.
         release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
             the spools.
@@ -41,8 +41,8 @@ def swing_range(
         limits: a floor, z in the robot's axes, and no other limit; None: those of the robot.
 
     Returns:
-        the launches, in the robot's axes. Launches found are feasible, by a formula; that none is slower holds for
-        their times of flight, which are searched.
+        the launches, in the robot's axes. A formula proves that they are feasible. That no slower launch is feasible
+        is not proved: times of flight are searched.
 
     Raises:
         InputError: the wrong kind of robot, spools in several planes, pulleys, limits other than a floor, shapes that

@@ -51,13 +51,13 @@ def plot(  # noqa: PLR0913
         results: a result of `open_result`, or the path of a result, a run directory or a motion file; or several.
         quantity: map: a quantity; None: "arcs", or the first there is. Motion: "trajectory", the path in space;
             "tensions", with their limits; "summary", all on one page; "acceleration", beside all that are feasible at
-            the instant `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight
+            the time `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight
             lines; or "landing", of a sample of throws; None: path and tensions over time.
         at: map: fixed values of axes, within their ranges; the nearest point is taken. Motion: "t", s.
         best: map: axes of which each cell shows the best point, such as "z0"; see `Result.best`. Quantity "best_z0"
             is that point.
         lines: axis whose points become lines; None: sections, or one line.
-        envelope: whether to draw all orientations of one place, in three dimensions.
+        envelope: whether to draw all orientations at one position, in three dimensions.
         solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
         ratio: whether to draw the quantity of the first of two maps over that of the second, over the same cells.
         size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
@@ -67,8 +67,8 @@ def plot(  # noqa: PLR0913
             8.5cm" and the like; the height follows. None: neither.
         title: whether titles are drawn; a motion that is not proved feasible is marked in any case.
         plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
-        robot: in its place the robot of motions in CSV, as for `check`; None: none.
-        z_axis: or only where z points in them, "up" or "down"; None: as robot and plan say, else where it seems to.
+        robot: in place of `plan`, the robot of motions in CSV, as for `check`; None: none.
+        z_axis: in place of both, the direction of z in them, "up" or "down"; None: as robot and plan say, else guessed.
         output: picture to write; its ending selects the format. None: nothing is written.
 
     Returns:

@@ -37,8 +37,9 @@ from cspr_jax.store.reading.result import Result, open_result
 ResultOrPlan = Annotated[
     str | Path | Result | Plan, Kind("a result, a plan, or the path of one", (str, os.PathLike), ("to_xarray",))
 ]
-# Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
-USUAL, MAX_TRAJECTORIES, RATE, STEP = 50, 500, 60.0, 100
+USUAL, MAX_TRAJECTORIES = 50, 500  # motions of cells, by default and at most
+RATE = 60.0  # rows per second of a plan's motion
+STEP = 100  # to a multiple of which the number of its rows is rounded
 
 
 @checked()
@@ -69,8 +70,8 @@ def report(
         quantity: map: quantity to show first; None: the main quantity of its kind of map.
         best: map: axes of which each cell shows the best point, such as "z0", as in `plot`.
         plan: plan file of a motion in CSV, which keeps neither robot nor limits; None: none.
-        robot: in its place the robot of a motion in CSV, as for `check`; None: none.
-        z_axis: or only where z points in it, "up" or "down"; None: as robot and plan say, else where it seems to.
+        robot: in place of `plan`, the robot of a motion in CSV, as for `check`; None: none.
+        z_axis: in place of both, the direction of z in it, "up" or "down"; None: as robot and plan say, else guessed.
 
     Returns:
         warnings, one line each.
@@ -209,7 +210,7 @@ def _rank(points: np.ndarray, chosen: np.ndarray, cell: int) -> int:
 
 def _cell_axes(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
     for axis, coordinate in cell.items():
-        nearest(result, axis, coordinate, "--cell")  # refuses axes that there are not
+        nearest(result, axis, coordinate, "--cell")  # refuses unknown axes
     return {axis: float(cell.get(axis, points[0])) for axis, points in result.axes.items()}
 
 

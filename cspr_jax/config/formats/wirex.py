@@ -2,8 +2,8 @@
 
 A pulley swivels about the z axis of its base point, and the cable enters along it. Inertia is about the mass centre.
 
-Its library reads neither mass nor mass centre nor inertia, but writes them: in files of robots that nobody weighed they
-are the values with which it starts. These are taken for placeholders.
+Its library reads neither mass nor mass centre nor inertia, but writes them: robots that nobody weighed have its default
+values, which are taken for placeholders.
 """
 
 import math

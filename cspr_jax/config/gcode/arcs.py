@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
-# By which radii at start and end may differ, of the radius: as controllers have it.
+# Largest difference of the radii at start and end, over the radius, as in controllers.
 RADIUS_TOLERANCE = 0.001
-# Positions that are nearer to each other are one, m.
+# Positions that are nearer to each other are the same, m.
 SAME_PLACE = 1e-9
 
 
@@ -28,8 +28,8 @@ class ArcError(ValueError):
 
 
 def missed(half: float) -> float:
-    """Largest difference of two radii of coordinates that are each rounded by up to a half of a unit."""
-    # That at the start is off by sqrt(2) halves, that at the end by three coordinates a side.
+    """Largest difference of the radii at start and end that comes from rounding of coordinates by up to `half`."""
+    # sqrt(2) halves at the start, from both coordinates of the centre; three times as much at the end.
     return 4.0 * math.sqrt(2.0) * half
 
 

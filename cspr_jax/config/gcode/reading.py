@@ -74,7 +74,7 @@ def read_program(path: Path, start: list[float] | None = None) -> GcodeProgram:
 
 
 def _decimals(text: str) -> int:
-    # Zeros at the end may be left out: the most that a length has are those that all have.
+    # Trailing zeros may be left out: all lengths have as many decimals as the one with most.
     return min(max(map(len, _DECIMALS.findall(text)), default=0), MAX_DECIMALS)
 
 
@@ -189,7 +189,7 @@ class _GcodeReader:
         return lengths
 
     def _shift(self, axes: dict[str, Word]) -> None:
-        # The position is to have these coordinates; one that is not known yet has them.
+        # From here on the current position has these coordinates in the file (G92); unknown ones become known.
         for letter, length in self._lengths(axes).items():
             i = "XYZ".find(letter)
             if i >= 0:

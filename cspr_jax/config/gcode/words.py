@@ -15,7 +15,7 @@ SETTINGS = {0.0: "motion", 1.0: "motion", 2.0: "motion", 3.0: "motion", 17.0: "p
 SETTINGS |= {20.0: "units", 21.0: "units", 90.0: "distances", 91.0: "distances", 90.1: "centres", 91.1: "centres"}
 # Systems of coordinates; their offsets are those of a machine.
 SYSTEMS = {float(code) for code in range(54, 60)} | {59.1, 59.2, 59.3}
-# They lead to places that the machine knows, and the file does not.
+# They lead to positions that the machine knows, and the file does not.
 HOME = {28.0: "G28", 29.0: "G29", 30.0: "G30", 53.0: "G53"}
 DWELL, SHIFT, END_SHIFT = 4.0, 92.0, (92.1, 92.2)
 # Compensations and modes that are off, tool lengths, path modes, and how canned cycles return.

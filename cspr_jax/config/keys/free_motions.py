@@ -14,7 +14,7 @@ class FreeMotionKeys(Table):
     objective: Literal["time", "energy", "tension", "margin"] | None = Field(
         None,
         description='free: what the motion is the best in: "time" (the default) and "energy", the integral of the sum '
-        'of the squares of the tensions, are least; "tension", the largest one as a share of tension_max, is least; '
+        'of the squares of the tensions, are least; "tension", the largest one as a fraction of tension_max, is least; '
         '"margin" of all tensions is largest',
     )
     duration_max: Positive | None = Field(
@@ -33,7 +33,7 @@ class FreeMotionKeys(Table):
     starts: Annotated[int, Field(ge=1, le=64)] | None = Field(
         None,
         description="free: number of motions from which the search of a segment begins (default 8, in a plane 6): "
-        "lines, bent lines, and swings of 1, 2, ... arcs",
+        "lines, curved lines, and swings of 1, 2, ... arcs",
     )
     search_time: Positive | None = Field(
         None,

@@ -15,7 +15,7 @@ Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 class ErrorTable(Table):
     """Errors of a launch, whose scatter is computed."""
 
-    release: ErrorMagnitude = Field(0.0, description="standard deviation of the instant of release, s")
+    release: ErrorMagnitude = Field(0.0, description="standard deviation of the time of release, s")
     cable_length: ErrorMagnitude = Field(
         0.0, description="standard deviation of the length of each cable at the release, m"
     )

@@ -31,7 +31,7 @@ _KINDS = {
 }
 _NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
 GRID, RAMP_TIME = 500, 0.1
-# Positions less far from each other are one, m.
+# Positions nearer to each other are the same, m.
 SAME_PLACE = 1e-9
 # Number of cells of a grid in maps, where many paths are asked.
 MAP_GRID = 200
@@ -127,7 +127,7 @@ class PathTable(Table):
 
     @property
     def has_start(self) -> bool:
-        """Tell whether the table has the place where the path begins."""
+        """Tell whether the table says where the path begins."""
         return self.file is not None or self.start is not None
 
     @property

@@ -56,7 +56,7 @@ class Pose(Table):
     )
     time: Annotated[float, Field(ge=-LARGEST_TIME, le=LARGEST_TIME)] | None = Field(
         None,
-        description="spline: instant of this pose, s; of a leg's first pose 0 where it is absent. Only differences "
+        description="spline: time of this pose, s; of a leg's first pose 0 where it is absent. Only differences "
         "between poses count",
     )
     velocity: Vector | None = Field(

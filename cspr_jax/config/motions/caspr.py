@@ -147,7 +147,7 @@ def _vector(point: Element, tag: str, count: int, path: Path, label: str) -> lis
 
 
 def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path: Path, label: str) -> np.ndarray:
-    # Rates at the points: of the first and the last as they say, else the mean of those of both sides.
+    # Rates at the points: at the first and the last as the file says, else the mean of those on both sides.
     means = np.diff(values, axis=0) / np.diff(times)[:, None]
     ends = [
         _vector(points[k], "q_dot", values.shape[1], path, f"{label}, point {k % len(points) + 1}") for k in (0, -1)

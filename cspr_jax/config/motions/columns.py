@@ -1,4 +1,4 @@
-"""Columns of a table of a motion: what each holds, in which unit, and what follows for its samples.
+"""Columns of a table of a motion: which quantity each holds, and in which unit.
 
 Units stand behind the names (`config.motions.heads`), in a row of their own, or in a line `# units: mm, deg, ms`.
 Further lines of this kind are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
@@ -66,10 +66,10 @@ class MotionColumns:
     """Columns of a table.
 
     Fields:
-        names: of all columns, those of `NAMES`; empty: not read.
+        names: one of `NAMES` for each column; empty for a column that is not read.
         heads: of all columns, as the file has them.
         factors: (columns,) from the units of the file to SI.
-        is_written: whether this program wrote the table, in which legs meet in two rows of one time.
+        is_written: whether this program wrote the table; it writes two rows of the same time where legs meet.
         notes: lines for the user.
         is_named: whether anything names the columns.
         has_time_unit: whether anything says the unit of times.
@@ -85,7 +85,7 @@ class MotionColumns:
 
     @property
     def written_point(self) -> str | None:
-        """Point whose positions a table of this program has, which adds those of the mass centre to the origin's."""
+        """Point whose positions a table of this program has: the origin where those of the mass centre stand beside."""
         return None if not self.is_written else "origin" if "mass_centre_x" in self.heads else "mass-centre"
 
     def has(self, group: str) -> bool:
@@ -167,9 +167,9 @@ def columns(
 
 
 def identified(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]]:
-    """Names and units of heads; and the names, by the numbers of columns, that units and positions alone give.
+    """Names and units of heads; and, by column, the names that follow only from the unit or the order of columns.
 
-    The one column of times has another name, or columns stand in the order of `PLAIN` and all have units.
+    The only column in a unit of time holds the times. Columns that all have units may stand in the order of `PLAIN`.
     """
     parts, plain = resolved(heads), plain_names(len(heads), has_times)
     names, placed = [part.name for part in parts], dict[int, str]()
@@ -203,7 +203,7 @@ def _unread(heads: list[str], names: list[str]) -> list[str]:
 
 
 def _described(parts: list[Head], own_units: dict[int, str], common: dict[int, str]) -> str:
-    # Names with units, as a note says how columns without names were taken.
+    # Names and units for the note that says how columns without names are read.
     words = []
     for k, (name, _) in enumerate(parts):
         unit = unit_of(own_units.get(k, "")) or common.get(id(KINDS[KIND_OF[name]][0]), "")
@@ -212,7 +212,7 @@ def _described(parts: list[Head], own_units: dict[int, str], common: dict[int, s
 
 
 def _common(units: str, path: Path) -> dict[int, str]:
-    # Units of the directive, by the table that each is of.
+    # The unit of times, lengths and angles that holds for the whole file, by the `id` of the table of such units.
     common = {id(TIMES): "s", id(LENGTHS): "m", id(ANGLES): "rad"}
     said: set[int] = set()
     for word in map(unit_of, filter(None, re.split(r"[,;\s]+", units))):

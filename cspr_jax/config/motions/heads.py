@@ -24,7 +24,7 @@ KINDS = {
     "turning": (ANGLES, 1),
     "turning change": (ANGLES, 2),
 }
-# Groups of columns; `MotionTable` has a field for each, but for the two that become quaternions.
+# Groups of columns; `MotionTable` has a field for each, except the two that become quaternions.
 GROUPS = {
     "times": (("t",), "time"),
     "positions": (("x", "y", "z"), "length"),
@@ -139,7 +139,7 @@ def mentioned(text: str) -> list[str]:
 
 
 def units_within(text: str) -> list[str]:
-    """Units among the words of a comment, but for those that need not be said."""
+    """Units among the words of a comment, except those that need not be said."""
     words = re.findall(r"(?<![\w/])(?:[^\W\d_]+|°)(?![\w/])", text.lower())
     units = [unit_of(word) for word in words if word not in ("min", "us")]
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]

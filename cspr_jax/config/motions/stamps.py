@@ -1,4 +1,4 @@
-"""Times of tables as they are written: stamps since 1970 have more digits than floats, and tell their unit by them."""
+"""Times of tables as they are written: stamps since 1970 have more digits than floats, and these show their unit."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from cspr_jax.config.motions.heads import TIMES
 from cspr_jax.numerics.shapes import Float
 
-# Whole stamps without a unit that are times between these, s since 1970, have digits enough to tell their unit.
+# A whole number without a unit is a stamp in the unit in which it lies between these times, s since 1970.
 EPOCH = (3e8, 5e9)
 UNITS = ("ms", "us", "ns")
 LARGE = 1e6  # floats hold smaller stamps to 1e-10
 LONGEST = 60  # digits
-CLOSER = 100.0  # times closer than others in the median are stamps that nearly repeat
+CLOSER = 100.0  # a stamp nearly repeats if its step is that many times smaller than the median one
 _DIGITS, _DECIMAL = re.compile(r"[0-9]+"), re.compile(r"[-+]?[0-9]+\.?[0-9]*")
 
 
 def unit_of_stamps(cell: str) -> str | None:
-    """Unit in which a whole number is a time of our days, but for seconds."""
+    """Unit other than seconds in which a whole number is a time of our days."""
     if not _DIGITS.fullmatch(cell) or len(cell) > LONGEST:
         return None
     return next((unit for unit in UNITS if EPOCH[0] <= float(cell) * TIMES[unit] < EPOCH[1]), None)

@@ -78,7 +78,7 @@ class MotionPieces:
     """Piecewise polynomial motion.
 
     Fields:
-        knots: (m + 1,) instants between the pieces, increasing, s.
+        knots: (m + 1,) times between the pieces, increasing, s.
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
         quaternion: (m, degree + 1, 4) likewise, scalar first, of any length but zero; or None.
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.

@@ -28,13 +28,14 @@ BLOCK = 4 << 20  # bytes that are read at a time
 LARGEST_LINE = 1 << 16
 MAX_ROWS = 1_000_000  # of a table that is read as a whole
 WINDOW = 200_000  # rows
-# Rows of the neighbours that a window has besides. In a spline an end counts by 0.27 (cubic) or 0.43 (quintic) a row.
+# Rows of its neighbours that a window includes: the influence of a row on a spline falls by a factor 0.27 (cubic) or
+# 0.43 (quintic) from one row to the next.
 OVERLAP = 100
 # Lengths of quaternions that are taken for unit ones, that are normalised with a note, and that are refused beyond.
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
 MEETING = 1e-6  # fraction of the size of a motion by which its legs may miss each other
 
-EMPTY = (",", ";", "\t", " ")  # how lines begin that may have nothing in them
+EMPTY = (",", ";", "\t", " ")  # first characters of lines that may hold separators only
 _COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)
 _EMPTY_LINE = re.compile(r"^[,;\t ]+$", re.MULTILINE)
 
@@ -94,7 +95,7 @@ class _Reader:
         self.columns: MotionColumns
         self.delimiter: str | None = None
         self.stamps = Stamps()
-        self.is_close = False  # whether a stamp that nearly repeats was told
+        self.is_close = False  # whether the user has been told that stamps nearly repeat
         self.converters: dict[int | str, Callable[[str], float]] = {}
 
     def blocks(self) -> Iterator[np.ndarray]:

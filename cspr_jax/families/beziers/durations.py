@@ -113,29 +113,29 @@ def least_duration(
         motions = Bezier(many.start, many.middles(times), many.end, times, np.full(len(times), z0))
         return verdicts_within(allowed, motions)
 
-    # Limits that every duration touches are no reason to touch others.
+    # Let limits be touched only if no duration stays clear of all of them.
     for allowed, (first, last) in itertools.product((problem, touchable(problem)), intervals):
         widest = max(WIDEST * first, slowest(problem, np.concatenate([ends.start, ends.end])))
         times = np.geomspace(first, min(last, widest), TRIED)
         good = np.flatnonzero(verdicts_of(times, allowed).verdict == 0)
         if len(good):
             return _narrowed(partial(verdicts_of, allowed=allowed), times, int(good[0]))
-    # Nothing is feasible, so the duration that comes nearest stands in.
+    # Nothing is feasible: return the duration that comes nearest.
     extent = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
     unit = np.sqrt(max(extent, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
     times = times[np.isfinite(times)]
-    judgements = verdicts_of(times)
+    results = verdicts_of(times)
     if limits_set(problem.limits):
-        return float(times[_nearest(judgements)])
-    return float(times[np.argmax(np.nan_to_num(judgements.margin, nan=-np.inf))])
+        return float(times[_nearest(results)])
+    return float(times[np.argmax(np.nan_to_num(results.margin, nan=-np.inf))])
 
 
-def _nearest(judgements: Verdicts) -> int:
+def _nearest(results: Verdicts) -> int:
     # Prefer durations that keep cables taut below the spools, then those that break the fewest limits by the least.
-    margin = np.nan_to_num(np.minimum(judgements.margin, judgements.limit_margin), nan=-np.inf)
-    counts = np.sum([(judgements.verdict & flag.value) > 0 for flag in Verdict], axis=0)
-    return int(np.lexsort((-margin, counts, ~(judgements.margin > 0.0)))[0])
+    margin = np.nan_to_num(np.minimum(results.margin, results.limit_margin), nan=-np.inf)
+    counts = np.sum([(results.verdict & flag.value) > 0 for flag in Verdict], axis=0)
+    return int(np.lexsort((-margin, counts, ~(results.margin > 0.0)))[0])
 
 
 def slowest(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> float:

@@ -26,7 +26,7 @@ from cspr_jax.robots.model.point_mass import AT_P0, spool_radius
 
 # Accelerations that count as none, over gravity.
 AT_REST = 1e-9
-# Durations of a search count as its shortest ones up to so many times them.
+# A duration within this factor of the shortest one that the search tries counts as that one.
 ABOVE_SHORTEST = 1.0 + 1e-6
 
 
@@ -158,7 +158,7 @@ class Beziers(Leg):
 
 
 def _question(waypoints: Waypoints, table: LaunchTable, points: np.ndarray, depth: float, gravity: float) -> Launch:
-    # Ask what the [launch] table asks; depth is that at which slacks are normalised.
+    # Requirements of the [launch] table; `depth` is that at which slacks are normalised.
     parabola = parabola_of(table, waypoints.frame, gravity, waypoints.path)
     duration = waypoints.poses[table.segment - waypoints.first + 1].duration
     if table.release is not None and isinstance(duration, float) and not table.release < duration:

@@ -69,7 +69,7 @@ def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Float[Array, "3"]:
 
 @jax.jit
 def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
-    """Smallest pseudotensions and depth of a segment, (22) to (25); the last with "min" in place of "max"."""
+    """Smallest pseudotensions and depth of a segment: (22) to (25), with the minimum in (25) in place of "max"."""
     rows, arms = adjugate(robot)
     square, linear, constant = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
     position = square + linear + constant

@@ -28,10 +28,10 @@ from cspr_jax.schema.verdicts import Verdict
 
 BATCH, SAMPLES = 512, 65
 # Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far
-# as the distance; and those of a finer search between the neighbours of the best one, as often as it takes, up to so
-# often.
+# as the distance.
 TRIED, SHORTEST, LONGEST = 257, 1e-2, 100.0
-FINER, ROUNDS = 33, 4
+FINER = 33  # durations of a finer search between the neighbours of the best one
+ROUNDS = 4  # of finer searches, at most
 # Fraction of a duration to which ends of intervals are narrowed.
 CLOSE = 1e-9
 

@@ -27,9 +27,9 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of
 from cspr_jax.verification.proved_verdicts import Verdicts
 
-# Segments that are proved together, and the largest margin over the weight a cable that counts for searches: on cables
-# that tighten each other without largest tensions it has no bound.
-TOGETHER, LARGEST = 64, 1e6
+TOGETHER = 64  # segments that are proved at a time
+# Larger margins, over weight / n_cables, count as this one in searches: without largest tensions they have no bound.
+LARGEST = 1e6
 LIMIT_FLAGS = [row.flag for row in LIMITS if row.quantity != "tension"]
 
 

@@ -91,9 +91,9 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.families.beziers.redundant_verdicts import verdicts_and_proofs
 
-        judgements, proofs = verdicts_and_proofs(problem, motions)
+        results, proofs = verdicts_and_proofs(problem, motions)
     else:
-        judgements = verdicts(problem, motions)
+        results = verdicts(problem, motions)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     intervals = np.empty(count, object)
     for i, durations in enumerate(segments.taut_durations):
@@ -101,11 +101,11 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
     return BezierAnswers(
         none,
         none,
-        judgements.verdict,
+        results.verdict,
         motions.time,
-        judgements.margin,
-        judgements.bound,
-        judgements.limit_margin,
+        results.margin,
+        results.bound,
+        results.limit_margin,
         *(nothing, nothing, nothing),
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,

@@ -83,10 +83,10 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
 
 
 def verified(problem: Problem, segments: Bezier) -> Verified:
-    """Judgement of a sequence, proved."""
-    judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
-    worst = smallest_slacks(problem, judgements).min()
-    return Verified(bool((judgements.verdict == 0).all()), float(worst))
+    """Verify a sequence: is it proved feasible, and what is its smallest slack?"""
+    results = verdicts(problem, jax.tree.map(np.asarray, segments))
+    worst = smallest_slacks(problem, results).min()
+    return Verified(bool((results.verdict == 0).all()), float(worst))
 
 
 def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:

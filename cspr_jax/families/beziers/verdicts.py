@@ -82,11 +82,11 @@ def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
     return Verdicts(verdict, slack.min(1), bound.min(1), limit_margin)
 
 
-def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray, "n"]:
+def smallest_slacks(problem: Problem, results: Verdicts) -> Float[np.ndarray, "n"]:
     """Smallest slack of each segment, of tensions and limits, without a unit."""
-    robot, margin = problem.robot, judgements.margin
+    robot, margin = problem.robot, results.margin
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
     # Above the spools the margin of limits of tensions is not known, and the depth decides.
-    minimum = np.where(np.isneginf(judgements.limit_margin), margin, np.minimum(margin, judgements.limit_margin))
+    minimum = np.where(np.isneginf(results.limit_margin), margin, np.minimum(margin, results.limit_margin))
     return np.where(np.isnan(minimum), -np.inf, minimum)

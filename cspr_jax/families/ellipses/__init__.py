@@ -3,8 +3,8 @@
 A point mass that moves as x = C + a cos(wt) + b sin(wt) has pseudotensions of one harmonic each, so that verdict,
 margin and the interval of feasible frequencies are formulas; at the natural frequency every ellipse below the spools is
 feasible whose centre lies below their hull. Rest is an ellipse without axes: from rest, to rest and from one ellipse to
-another, centre, axes, frequency and orientation go over into each other along an amplitude function, in the smallest
-number of arcs that is proved.
+another, centre, axes, frequency and orientation change along an amplitude function, in the smallest number of arcs that
+is proved.
 
 Source: Gosselin, Ren, Foucault (ICRA 2012); Mottola, Gosselin, Carricato (J. Mechanisms and Robotics 10, 2018, 031004);
 derived for any coplanar spools, centre and plane in docs/theory.md.

@@ -25,11 +25,11 @@ from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of
 
-# Roundings of a margin, in parts of the largest number in it, with a reserve.
+# Rounding error of a margin over the largest number in it, with a reserve.
 MARGIN_ERROR = 256.0 * float(np.finfo(float).eps)
 BATCH = 64  # blocks of which bounds are computed at a time
 TOGETHER = 1024  # turns that are proved at once
-# Not less than a turn, whatever the rounding.
+# An angle just above a full turn, so that rounding leaves no part of the turn out.
 TURN = math.nextafter(2.0 * math.pi, 7.0)
 
 
@@ -102,7 +102,7 @@ def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.nda
 def _margins(
     hull: SpoolHull, robot: PointMassRobot, ellipses: Ellipse, frequencies: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest values of the edges and of the depth, (n, n_edges + 1), and what rounding may be of each, (n, 1).
+    # Smallest values of the edges and of the depth, (n, n_edges + 1), and their rounding errors, (n, 1).
     margins = harmonics.of_many(harmonics.harmonic_margins, hull, ellipses, frequencies)
     centre, a, b = (np.linalg.norm(array, axis=1) for array in ellipses)
     normal = np.asarray(hull.normal)

@@ -33,7 +33,7 @@ ANGLES = 128  # samples of a turn where there are many frequencies
 FINE = 4096  # for one frequency alone
 GRID = 65  # frequencies
 HALVINGS = 40  # that follow
-INSIDE = 1e-5  # fraction by which an end is kept off
+INSIDE = 1e-5  # distance that is kept from an end of the feasible frequencies, over the frequency
 # Factors of the natural frequency between which a frequency is sought where no formula bounds it.
 WIDEST = 100.0
 SLOWER = "a number: the slower this ellipse, the larger the margin"
@@ -58,7 +58,7 @@ def chosen_frequency(
             return natural
         low, high = max(low, first), min(high, last)
 
-    # Limits that every frequency touches are no reason to touch others.
+    # Let limits be touched only if no frequency stays clear of all of them.
     for allowed in (problem, touchable(problem)):
         frequency = searched_frequency(
             lambda rates, allowed=allowed: sampled_slacks(allowed, ellipse, rates, scene, rotation),

@@ -153,16 +153,16 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
 
-    # The smallest of concave functions is concave: it rises up to its largest value.
+    # The minimum of concave functions is concave: it rises up to its largest value.
     def halved(_, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (ends[0] + ends[1])
         rates = jnp.stack([_decrease(edge, middle) for edge in terms.edges])
         rate = rates[jnp.argmin(jnp.stack(_slacks(terms, middle)))]
-        # A level slack, as without axes, is best taken at the frequency nearest to the natural one.
+        # If the slack does not depend on the frequency, as without axes, take the one nearest to the natural one.
         rises = (rate < 0.0) | ((rate == 0.0) & (middle < 0.0))
         return jnp.where(rises, middle, ends[0]), jnp.where(rises, ends[1], middle)
 
-    # Beside the natural frequency, e = 0, nothing helps an edge whose slack e does not change.
+    # If an edge's slack does not depend on e, it must be positive at the natural frequency, e = 0.
     ends = (jnp.clip(low, -1e6, 0.0), jnp.clip(high, 0.0, 1.0))
     first, last = jax.lax.fori_loop(0, HALVINGS, halved, ends)
     e = 0.5 * (first + last)

@@ -14,7 +14,7 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
 
-# Spools count as in one plane within this part of the radius of the robot.
+# Spools count as coplanar within this distance of a plane, over the radius of the robot.
 IN_PLANE = 1e-9
 
 

@@ -42,7 +42,7 @@ from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import answers_of, judge_all_robots
+from cspr_jax.verification.proved_answers import answers_of, verify_all_robots
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +50,7 @@ class EllipseAnswers(Answers):
     """Answers of segments that end on ellipses, or at rest; margins are those of the tensions, in N.
 
     Fields:
-        of_ellipses: (n,) details of the ellipse on which each segment ends; of one that ends at rest, starts.
+        of_ellipses: (n,) details of the ellipse on which each segment ends, or, if it ends at rest, starts.
         flight_time: (n,) time of the flight of an object that is released at the end of each segment, s; NaN without.
     """
 
@@ -213,7 +213,7 @@ class Ellipses(Leg):
         return {"axis": axis / np.linalg.norm(axis), "oscillation": parts}
 
     def _check_axes(self, turnings: list[Turning], i: int) -> None:
-        # Between two oscillations about one axis the angles go over into each other.
+        # Two oscillations must have one axis, so that the angle of one can change into that of the other.
         before, after = turnings[max(i - 1, 0)], turnings[i]
         if before.oscillation.any() and after.oscillation.any() and not np.allclose(before.axis, after.axis):
             key = self._key(i, "oscillation.axis")
@@ -271,7 +271,7 @@ class Ellipses(Leg):
         plain = answers_of(
             [transfer.proof for transfer in transfers], np.array([float(motion.duration()) for motion in motions])
         )
-        judge_all_robots(problem, plain, motions, scene)
+        verify_all_robots(problem, plain, motions, scene)
         arcs, verdict = np.array([transfer.arcs for transfer in transfers]), np.array(plain.verdict, FLAGS)
         free = (self.waypoints.arcs == 0) & (arcs > 0)
         broken = (verdict != 0) & (verdict != Verdict.UNDECIDED.value)

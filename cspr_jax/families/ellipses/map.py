@@ -17,7 +17,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 MAX_CABLES = 250
-# By how much ends of intervals may be off, in parts of themselves.
+# Relative error of ends of intervals.
 CHECK_ERROR = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Releases from ellipses: the ellipse that passes a point with a velocity, and the choice of what is left open.
+"""Releases from ellipses: the ellipse that passes a point with a given velocity, and choices that a launch leaves open.
 
 An object that is to leave at the point p with the velocity v leaves the ellipse
 
@@ -38,11 +38,11 @@ SHORTEST = 0.01
 LONGEST = 100.0
 GRID = 257
 COARSE_GRID = 33  # times of flight for each number of arcs
-HALVINGS = 40  # that narrow an end
-# Fractions of the distance to the middle of the feasible times by which an end is kept off.
+HALVINGS = 40  # of an interval that holds an end of the feasible times
+# Distances from an end of the feasible times that are tried, over the distance to their middle.
 INSIDE = (1e-3, 1e-2, 1e-1)
 SAMPLES = 256  # of a transfer
-# Frequencies are sought between these parts of the natural one.
+# Frequencies are sought from 1 / WIDEST to WIDEST times the natural one.
 WIDEST = 100.0
 
 
@@ -115,7 +115,7 @@ class ReleaseRequirement(NamedTuple):
 def chosen_release(
     requirement: ReleaseRequirement, before: Turning, rule: str | float, choose: str | None, arcs: range
 ) -> Release:
-    """Release with all that a launch leaves open chosen."""
+    """Release of a launch, with the time of flight and the frequency chosen where the launch does not give them."""
     nothing = np.zeros(3)
     natural = natural_frequency(requirement.problem, Ellipse(requirement.centre, nothing, nothing))
     frequency, time = rule if isinstance(rule, float) else natural, requirement.parabola.time
@@ -167,7 +167,7 @@ class _Times:
         return end + INSIDE[0] * (self._middle(at) - end)
 
     def of_earliest_landing(self, before: Turning, arcs: range) -> float:
-        # Fewer arcs take less time, and bear slower releases alone.
+        # Fewer arcs take less time, but are feasible only for slower releases.
         feasible = np.flatnonzero(self._slacks > 0.0)
         best, landing = None, np.inf
         if not len(feasible):
@@ -212,8 +212,8 @@ class _Times:
         return self._requirement.slacks(times, np.full(len(times), self._frequency))
 
     def _slowest(self) -> float:
-        # The time of flight with the slowest release of all, by a formula; of a given velocity at the target, the time
-        # since the summit of the parabola.
+        # The time of flight with the slowest release, by a formula; if the velocity at the target is given, the release
+        # is slowest at the summit of the parabola.
         parabola, gravity = self._requirement.parabola, float(self._requirement.problem.robot.gravity)
         if parabola.velocity is None:
             time = math.sqrt(2.0 * float(np.linalg.norm(parabola.target - parabola.point)) / gravity)

@@ -55,7 +55,7 @@ def _quaternion(axis: Array, angle: Array) -> Array:
 
 
 def _direction(vector: Array) -> tuple[Array, Array]:
-    # Unit vector, any of a vector without a length, and the length.
+    # Unit vector along a vector, and its length; (1, 0, 0) if the length is zero.
     norm = length(vector)
     return jnp.where(norm > 0.0, vector / jnp.where(norm > 0.0, norm, 1.0), jnp.eye(3)[0]), norm
 
@@ -68,10 +68,10 @@ def rotation_state(
     swing = _quaternion(rotation.axis, psi[0])
     quaternion = rotations.product(swing, rotations.product(_quaternion(direction, s[0] * angle), rotation.start))
     outer = rotations.matrix(swing)
-    spin, second_derivative = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
+    turning, second_derivative = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
     oscillating = psi[1] * rotation.axis
-    rate = psi[2] * rotation.axis + second_derivative + jnp.cross(oscillating, spin)
-    return rotations.matrix(quaternion), oscillating + spin, rate, quaternion
+    rate = psi[2] * rotation.axis + second_derivative + jnp.cross(oscillating, turning)
+    return rotations.matrix(quaternion), oscillating + turning, rate, quaternion
 
 
 def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
@@ -80,10 +80,10 @@ def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
     outer = _about(rotation.axis, psi[0])
     inner = dot(_expanded(_about(direction, s[0] * angle)), rotations.matrix(rotation.start).T[None])
     full = dot(_expanded(outer), inner.each(lambda x: x.T[None]))
-    spin, second_derivative = rotated(outer, s[1] * rotation.turn), rotated(outer, s[2] * rotation.turn)
+    turning, second_derivative = rotated(outer, s[1] * rotation.turn), rotated(outer, s[2] * rotation.turn)
     oscillating = psi[1] * rotation.axis
     return RotationBounds(
-        full, oscillating + spin, psi[2] * rotation.axis + second_derivative + cross(oscillating, spin)
+        full, oscillating + turning, psi[2] * rotation.axis + second_derivative + cross(oscillating, turning)
     )
 
 

@@ -1,4 +1,4 @@
-"""Range of swings: to each landing place the slowest release from an ellipse about a centre, at its natural frequency.
+"""Range of swings: the slowest release to each landing point from an ellipse about a centre, at its natural frequency.
 
 After the time of flight t the object is at the target if the velocity of the release p is (q - p) / t, with q the point
 above the target from which it would fall there in that time. With depths below the plane of the spools, D that of the
@@ -44,10 +44,10 @@ LEVEL = 1e-9
 
 @dataclasses.dataclass(frozen=True)
 class SwingRange(Releases):
-    """Slowest releases from ellipses to n landing places; see `Releases`.
+    """Slowest releases from ellipses to n landing points; see `Releases`.
 
-    Where there is none, the verdict says what stands in the way at all times of flight that were tried. Margins are
-    of taut cables and depth, and over the depth of the centre of the floor.
+    Where there is none, the verdict says what fails at all times of flight that were tried. Margins are those of taut
+    cables and of the depth; the one of the floor is over the depth of the centre.
 
     Fields:
         swing_amplitude: (n,) largest distance of the ellipse from its centre, m.

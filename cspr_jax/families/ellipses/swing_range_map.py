@@ -15,7 +15,7 @@ _OF_SWINGS = ("release_speed", "flight_time", "swing_amplitude", "release_x", "r
 
 
 class SwingRangeMap(ReleasesMap):
-    """The slowest release from an ellipse to each landing place; see `GridMap`."""
+    """The slowest release from an ellipse to each landing point; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse limits and keys of searches that formulas do not know."""

@@ -4,8 +4,8 @@ Between poses a motion is a quintic B-spline of normalised time, with four conti
 their rates are continuous. Its control points, its duration and the accelerations at the poses are found by an
 interior-point method on the limits at many samples, from several starts. The proof of any motion then says where
 limits are missed between samples; there they are tightened, and the search goes on. For all robots within an
-uncertainty they are tightened by what these lose. The orientation is a Rodrigues vector from an orientation in the
-middle, so that the motion is a spline of quaternions as all others are.
+uncertainty, limits are tightened by the slack that these robots lose. The orientation is a Rodrigues vector, measured
+from an orientation midway, so that the motion is a spline of quaternions as all others are.
 
 Files, each importing only from those above it:
 

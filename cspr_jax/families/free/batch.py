@@ -20,21 +20,20 @@ from cspr_jax.maps.proved_map import CONTACTS
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
-from cspr_jax.verification.proved_answers import MotionProof, answers_of, judge_all_robots, proofs_of
+from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of, verify_all_robots
 
-# Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
-# proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
-# and are some parts in a thousand faster. Samples of each interval.
-MESHES, SAMPLES = ((12, 32), (16, 28), (24, 36)), 4
-# Number of the weights and softnesses with which searches of plans go on that are tried on one mesh.
-TRIED = 2
+# Numbers of intervals of the first search and of the final motion. Pairs without a proved motion on one mesh are tried
+# on the next. Plans have more intervals, and motions that are some parts in a thousand faster.
+MESHES = ((12, 32), (16, 28), (24, 36))
+SAMPLES = 4  # of each interval
+TRIED = 2  # pairs of a weight and a softness that are tried on one mesh, of those in `FINE`
 
 
 class ManyFreeMotions(NamedTuple):
     """The fastest motions that were found between pairs of poses.
 
     Fields:
-        indices: (m,) numbers of the pairs for which the search met all limits at its samples.
+        indices: (m,) of the pairs for which the search met all limits at its samples.
         motions: m of them.
         answers: of these: proved, refuted or undecided.
     """
@@ -59,12 +58,12 @@ def free_motions(
     indices = sorted(best)
     motions = [best[k][0] for k in indices]
     answers = answers_of([best[k][1] for k in indices], np.array([float(one.knots[-1]) for one in motions]))
-    judge_all_robots(problem, answers, motions, scene)
+    verify_all_robots(problem, answers, motions, scene)
     return ManyFreeMotions(np.array(indices, int), motions, answers)
 
 
 def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
-    # Numbers of pairs, and their motions with proofs.
+    # Indices of the pairs with a motion, the motions, and their proofs.
     coarse, fine = (
         _stacked([question.tasks(intervals, samples) for question in questions])
         for intervals, samples in zip(mesh, (FEWEST, SAMPLES), strict=True)
@@ -83,7 +82,7 @@ def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterat
 
 
 def _stacked(tasks: Sequence[Tasks]) -> Tasks:
-    # Tasks of the same numbers of segments as one.
+    # Join tasks with equal numbers of segments, intervals and samples.
     values = {field.name: getattr(tasks[0], field.name) for field in dataclasses.fields(Tasks)}
     names = [name for name, value in values.items() if isinstance(value, np.ndarray) and value.ndim]
     joined: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in tasks]) for name in names}
@@ -91,14 +90,14 @@ def _stacked(tasks: Sequence[Tasks]) -> Tasks:
 
 
 def _refined(source: Basis, tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float) -> Unknowns:
-    # Motions on other intervals, (n, K, d), as the start of a search.
+    # Start a search on other intervals from motions, (n, K, d).
     functions = BSpline(source.knots, np.eye(source.controls), DEGREE)(tasks.basis.averages)
     fitted = np.einsum("kj,ji,nid->nkd", tasks.basis.fit, functions, controls, optimize=True)
     return started(tasks, fitted[:, None], duration[:, None], barrier)
 
 
 def _first_optima(tasks: Tasks, start: Unknowns, levels: Iterable[tuple[float, float]]) -> tuple[Unknowns, np.ndarray]:
-    # For each task the optimum of the first search that converges, with its barrier and softness; whether there is one.
+    # For each task the optimum of the first search that converges, and whether one does.
     unknowns, is_optimal = Unknowns(*(values.copy() for values in start)), np.zeros(len(start.duration), bool)
     for barrier, softness in levels:
         open_tasks = np.flatnonzero(~is_optimal)
@@ -121,7 +120,7 @@ def _put(
 def _proved(
     questions: Sequence[FreeQuestion], indices: np.ndarray, tasks: Tasks, unknowns: Unknowns
 ) -> tuple[list[Spline], list[MotionProof]]:
-    # Motions, tightened and searched again until all are proved, or no more helps.
+    # Motions and proofs: bounds are tightened and the search repeated until all are proved, or no more can be.
     problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in indices.tolist()]
 
     def motion(k: int) -> Spline:
@@ -159,7 +158,8 @@ def _proved(
 
 
 def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
-    # The motion whose bodies are separated, one by one, since planes belong to one motion; None without a proof.
+    # One motion, searched again with planes that separate its bodies, which differ from motion to motion; None without
+    # a proof.
     proof = proved(question, tasks, unknowns)
     if proof.is_stopped:
         raise KeyboardInterrupt

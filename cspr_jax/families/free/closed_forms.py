@@ -17,7 +17,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.model.point_mass import spool_radius
 
-# Part of the robot's radius, and of the speed of a fall from its height, by which motions may miss poses.
+# Motions may miss poses by this fraction of the robot's radius, and of the speed of a fall from that height.
 NEAR = 1e-9
 # Rodrigues vectors beyond which no search begins.
 FAR = 10.0
@@ -55,7 +55,7 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
             leg.check(problem)
             answers, motions = leg.join(problem, poses.z0)
         except (ConfigError, InputError):
-            continue  # the family joins other poses
+            continue  # the family cannot join these poses
         is_full = all(proof is not None and not proof.contacts_alone for proof in answers.proof)
         proved = answers if is_full else None
         form = ClosedForm(leg.waypoints.family, motions, answers.feasible, np.asarray(answers.duration), proved)

@@ -1,9 +1,9 @@
 """Planes in the space of coordinates that separate bodies where a motion brings them too near.
 
 The clearance of two bodies is linearised about the motion at each sample at which it is small; searched again within
-these planes, the motion gives new ones. Clearances of solid bodies are negative inside. Cables without thickness, and
-cables over a platform's face, have a side on which they are, that of the poses: the sign of the distance of their
-lines, or of the height of the spool over the face.
+these planes, the motion gives new ones. Clearances of solid bodies are negative inside. Those of two cables, and of a
+cable over a platform's face, have a sign instead, which must stay that of the poses: the sign of the volume that the
+lines of the cables span, or of the height of the spool over the face.
 """
 
 import dataclasses
@@ -26,18 +26,22 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.criteria import has_extent
 from cspr_jax.verification.piece_slacks import PieceSlacks
 
-# Over the robot's radius: clearance up to which bodies are separated, smallest clearance that they keep, and its
-# largest increase each time; step of difference quotients.
-NEAR, MIN_CLEARANCE, MAX_INCREASE, STEP = 0.1, 1e-4, 0.02, 1e-6
-# By how much more than lines motions are deflected round obstacles, those of platforms, whose searches take long,
-# once; how much slower they begin, the softness with which searches from them begin, and weight of barriers and
-# softness with which they go on; how many each has.
-WIDER, SLOWER, SOFTNESS, GO_ON, SEARCHES = (1.0, 2.0), 1.5, 10.0, (1e-3, 1e-1), 4
+# Lengths over the robot's radius.
+NEAR = 0.1  # clearance below which bodies are separated by planes
+MIN_CLEARANCE, MAX_INCREASE = 1e-4, 0.02  # clearance that they keep at first, and its largest increase each time
+STEP = 1e-6  # of difference quotients
+# Searches round obstacles start from motions deflected by these multiples of the deflection of lines; for platforms,
+# whose searches take long, by the first alone.
+WIDER = (1.0, 2.0)
+SLOWER = 1.5  # durations of these starts over those of the motion that meets an obstacle
+SOFTNESS = 10.0  # of the first search
+GO_ON = (1e-3, 1e-1)  # weight of the barriers and softness of further searches
+SEARCHES = 4  # largest number of searches; each is from all starts together
 
 
 class _Gap(NamedTuple):
-    # Clearance of two bodies in poses: a function of positions (k, 3) and quaternions (k, 4) or None, (k,) m, and
-    # whether the bodies are near each other there; whether its sign is a side; what it must exceed, m.
+    # Clearance of two bodies: a function that gives it for positions (k, 3) and quaternions (k, 4) or None, (k,) m, and
+    # tells whether the bodies are near each other; whether its sign is a side; its minimum, m.
     of_poses: Callable[[np.ndarray, np.ndarray | None], tuple[np.ndarray, np.ndarray]]
     has_sides: bool
     need: float
@@ -62,7 +66,7 @@ def separated(
 def around(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks
 ) -> tuple[Tasks, Unknowns] | None:
-    """The best motion of those that lead round the obstacles that one meets, deflected to all sides."""
+    """Search for motions round the obstacles that a motion meets, deflected to all sides, and take the best."""
     is_met, radius = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
     _, pairs = _bodies(question)
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
@@ -76,8 +80,8 @@ def around(
 def _clear(
     question: FreeQuestion, tasks: Tasks, deviation: Unknowns, minimum: dict[int, float]
 ) -> tuple[Tasks, Unknowns] | None:
-    # The best of the motions on the sides of deflected ones, if one is clear at all samples: planes about one after the
-    # other.
+    # Search from deflected motions, with planes about them, then with planes about what was found; return the best
+    # motion that is clear at all samples.
     within, begun = _parted(question, tasks, deviation, minimum, np.inf)
     begun = started(within, within.controls(begun), begun.duration)
     level, until = (BARRIERS[0], SOFTNESS), question.settings.until
@@ -106,7 +110,7 @@ def _clear(
 
 
 def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
-    # Lower bounds (n_pieces, n_meetings), m.
+    # Lower bounds (n_pieces, n_pairs), m.
     scene, pairs = _bodies(question)
     last = len(slacks.rows) - int(
         question.problem.limits.floor is not None and has_extent(question.problem.robot, scene)
@@ -154,7 +158,7 @@ def _parted(
 
 
 def _linear(tasks: Tasks, samples: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
-    # Clearances (l, s, m, n), m, and their gradients (l, s, m, n, d), by the coordinates; NaN where they say nothing.
+    # Clearances (l, s, m, n), m, and their gradients (l, s, m, n, d) by the coordinates; NaN where bodies are not near.
     def values(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         quaternions = quaternions_of(tasks, points)
         flat = points.reshape(-1, points.shape[-1])
@@ -175,8 +179,8 @@ def _linear(tasks: Tasks, samples: np.ndarray, gap: _Gap) -> tuple[np.ndarray, n
     return np.where(is_near, side * middle - gap.need, np.nan), side[..., None] * np.stack(gradients, axis=-1)
 
 
-def _gap(question: FreeQuestion, scene: Scene, meeting: ContactPair) -> _Gap:
-    kind, k, other = meeting
+def _gap(question: FreeQuestion, scene: Scene, pair: ContactPair) -> _Gap:
+    kind, k, other = pair
     if kind == "cables":
         return _Gap(_between_lines(scene, k, other), True, 0.5 * float(scene.diameters[[k, other]].sum()))
     if kind == "platform" and scene.body is None:

@@ -21,19 +21,20 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.runtime.stages import stage
-from cspr_jax.verification.proved_answers import judge_all_robots
+from cspr_jax.verification.proved_answers import verify_all_robots
 
 # Weights of barriers, and softness, with which searches go on from a coarser motion.
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Searches of all segments together: by what the intervals are divided, and the index of an option of `FINE`. Searches
-# that get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
+# Searches of all segments together, one after the other until one converges: divisor of the number of intervals, and
+# index of `FINE`. On fewer intervals a search gets stuck less often, and motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
-# Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
-# this part of its duration: by what the intervals are divided, and the softness; samples of each interval. The last
-# one, on few intervals, is for those for which no start has led to any.
-SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0)), 3, 1e-3
-# Part of the time after which searches of segments end once each has a motion: the rest is for all together, and for
-# tightening.
+# Searches of single segments: divisor of the number of intervals, and softness. Each but the last is for segments whose
+# best motion only one start has led to so far; the last, on few intervals, for segments without a motion.
+SEARCHES = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0))
+FEWEST = 3  # samples of each interval
+SAME = 1e-3  # relative difference of durations within which two motions are the same
+# Fraction of the search time after which searches of single segments end, once each has a motion. The rest is for the
+# search of all segments together, and for tightening.
 ENOUGH = 0.5
 
 USUAL = FreeSettings()
@@ -48,7 +49,7 @@ class SegmentMotion(NamedTuple):
         cost: the objective; inf where no search has converged.
         basis: of the control points.
         is_shared: whether two starts or more have led to it.
-        start: number of its start.
+        start: index of the start that it was searched from.
     """
 
     controls: np.ndarray
@@ -69,7 +70,7 @@ class FreeMotion:
     """The best motion that the search has come to.
 
     Fields:
-        motions: one a segment; of a search that came to none, the last one it tried.
+        motions: one per segment; if the search did not converge, those that it tried last.
         answers: of them: proved, refuted or undecided.
         energy: (n,) integral of the sum of the squares of the tensions, N^2 s, of the segments.
         level: (n,) of the objective, as `objectives` has it.
@@ -77,7 +78,7 @@ class FreeMotion:
         is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
         parts: best motions along the segments by themselves.
-        families: (n,) whose motions these are, where the search came to none that are faster; None: its own.
+        families: (n,) family of each motion that stands in place of the search's own; None: all are the search's.
     """
 
     motions: list[Spline]
@@ -126,14 +127,14 @@ def free_motion(
     searched = float(unknowns.duration.sum()) if is_optimal else np.nan
     proof = robust_proof(question, uncertainty, tasks, unknowns) if uncertainty is not None and is_optimal else None
     proof = proof or proved(question, tasks, unknowns, is_optimal=is_optimal)
-    judge_all_robots(problem, proof.answers, proof.motions, scene)
+    verify_all_robots(problem, proof.answers, proof.motions, scene)
     energy, level = proof.tasks.energies(proof.unknowns)[0], proof.unknowns.level[0]
     is_stopped |= proof.is_stopped
     return FreeMotion(proof.motions, proof.answers, energy, level, is_optimal, is_stopped, searched, tuple(best))
 
 
 def _begun(question: FreeQuestion) -> list[SegmentMotion]:
-    # Starts that are not searched from, since no motion can be proved.
+    # Starts of the search, as they are: no motion can be proved, so that none is searched for.
     single = segments_of(question.tasks(question.settings.intervals, FEWEST))
     begun = starts(single, question.poses.z0, 1)
     pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
@@ -146,10 +147,10 @@ def _searched(
     forms: Sequence[ClosedForm],
     lines: Sequence[ClosedForm],
 ) -> tuple[list[SegmentMotion], bool]:
-    # The best motion along each segment by itself, from all starts, or after those from forms; where starts disagree,
-    # by all searches. Whether the search has been stopped: by Ctrl-C only where there is something to keep.
+    # Return the best motion along each segment by itself, and whether the search has been stopped (Ctrl-C raises if
+    # there is no motion to keep). With closed forms, the first search starts from these instead of the usual starts.
     settings, poses = question.settings, question.poses
-    # No form is the start that has led to what was there before.
+    # Motions from earlier searches have no start among these.
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
     until, begin = settings.until, time.monotonic()
     enough = begin + ENOUGH * (until - begin)
@@ -197,7 +198,7 @@ def _all_optimal(best: dict[int, SegmentMotion]) -> bool:
 def _keep(
     best: dict[int, SegmentMotion], segments: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima
 ) -> None:
-    # Keeps what is better than before. Starts of different searches that lead to the same motion agree, too.
+    # Keep the better motions. Those that two starts have led to are marked, also if these belong to two searches.
     controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
     is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
     costs = np.where(is_optimal, costs, np.inf)

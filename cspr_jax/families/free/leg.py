@@ -14,11 +14,11 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.families.free.closed_forms import ClosedForm, closed_forms
 from cspr_jax.families.free.free_motion import FreeMotion, free_motion
-from cspr_jax.families.free.no_slower import can_be_faster, fits, no_slower, no_slower_than_lines, stood_in
+from cspr_jax.families.free.no_slower import can_be_faster, fits, lines_instead, no_slower, no_slower_than_lines
 from cspr_jax.families.free.poses import FreePoses, divided
 from cspr_jax.families.free.problem import FreeSettings
 from cspr_jax.families.free.search.time_bounds import time_bounds
-from cspr_jax.families.free.static_poses import OF_PLACES, first_refused
+from cspr_jax.families.free.static_poses import OF_POSITIONS, first_refused
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.motion import Motion, states_at
@@ -39,7 +39,7 @@ DIVIDED = (
 )
 FOLLOWED = 'the search found nothing faster than family = "{}", whose motions these are'
 LINES = 'the search found nothing faster than a line in its least time, as of family = "{}", which leads to {}{}'
-# Part of the largest acceleration by which accelerations change at once where they jump.
+# Accelerations jump where they change at once by more than this fraction of the largest one.
 JUMPING, JUMP = "; accelerations jump along it", 0.01
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
@@ -61,7 +61,7 @@ class FreeAnswers(Answers):
     source: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """The quantity that was sought, and a time that no motion undercuts; see `Answers.details`."""
+        """The objective, and the lower bound of the time of any motion; see `Answers.details`."""
         details = super().details(i) | {"objective": self.objective, "energy": float(self.energy[i])}
         details["source"] = str(self.source[i])
         bound = float(self.lower_bound[i])
@@ -110,7 +110,7 @@ class FreeMotions(Leg):
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)
-        # Segments have nothing in common if all accelerations are given.
+        # If all accelerations are given, segments can be searched one by one.
         is_separate = waypoints.plan_file.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
@@ -138,12 +138,12 @@ class FreeMotions(Leg):
         return FreeAnswers(**columns), list(motions)
 
     def _refuse_poses(self, problem: Problem, scene: Scene, poses: FreePoses) -> None:
-        # Poses that no motion can have.
+        # Refuse poses that no motion can have.
         refused = first_refused(problem, scene, poses, self.waypoints.frame)
         if refused is None:
             return
         i, cause = refused
-        position, is_place = self.waypoints.poses[i].position, bool(Verdict[cause.criterion.upper()] & OF_PLACES)
+        position, is_place = self.waypoints.poses[i].position, bool(Verdict[cause.criterion.upper()] & OF_POSITIONS)
         key = f"{self.waypoints.name(i)}.position = {shown(position)}"
         if position is None or (self.waypoints.poses[i].rest and not is_place):
             key = f"{self.waypoints.name(i)}.rest = true"
@@ -151,7 +151,7 @@ class FreeMotions(Leg):
         raise ConfigError(self.waypoints.path, f"{key}: {allowed}: {cause.text}")
 
     def _said(self, sources: list[str | None], motions: list[Spline]) -> list[str]:
-        # Which motions are those of other families; lines take the place of single segments.
+        # Lines of text that say which motions are those of other families; only lines replace single segments.
         lines = []
         for family in dict.fromkeys(source for source in sources if source):
             indices = [i for i, source in enumerate(sources) if source == family]
@@ -166,7 +166,7 @@ class FreeMotions(Leg):
 
     @property
     def _settings(self) -> FreeSettings:
-        # With the end of a search that begins now.
+        # The search time counts from here.
         spec = self.waypoints.plan_file
         until = np.inf if spec.search_time is None else time.monotonic() + spec.search_time
         return FreeSettings(spec.objective or "time", spec.duration_max, spec.starts, until)
@@ -180,7 +180,7 @@ class FreeMotions(Leg):
         return [self._no_slower(problem, scene, poses, poses, lines, others)]
 
     def _separate(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
-        # Each segment begins with the acceleration with which the one before ends, but behind lines, where it jumps.
+        # Each segment begins with the acceleration with which the one before ends, except after lines, where it jumps.
         parts, accelerations = list[FreeMotion](), poses.accelerations.copy()
         lines, others = (cache(partial(closed_forms, legs, problem, poses)) for legs in (self._lines, self._others))
         for i in range(len(self)):
@@ -216,7 +216,7 @@ class FreeMotions(Leg):
         straight = lines()
         usable = [line for line in straight if fits(line, problem, requested, settings).all()]
         if usable and time.monotonic() > settings.until:
-            return stood_in(problem, scene, poses, settings, usable[0])
+            return lines_instead(problem, scene, poses, settings, usable[0])
         free = None
         try:
             free = free_motion(problem, scene, poses, settings, None, (), straight)
@@ -226,7 +226,7 @@ class FreeMotions(Leg):
         except KeyboardInterrupt:
             if not usable and (free is None or not free.answers.feasible.all()):
                 raise
-            free = stood_in(problem, scene, poses, settings, usable[0]) if free is None else free
+            free = lines_instead(problem, scene, poses, settings, usable[0]) if free is None else free
             free = dataclasses.replace(free, is_stopped=True)
         return no_slower_than_lines(free, problem, scene, requested, settings, straight)
 

@@ -11,13 +11,13 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.free.batch import free_motions
 from cspr_jax.families.free.poses import FreePoses, check_searched
 from cspr_jax.families.free.search.time_bounds import time_bounds
-from cspr_jax.families.free.static_poses import OF_PLACES
+from cspr_jax.families.free.static_poses import OF_POSITIONS
 from cspr_jax.maps.proved_map import ProvedMap, proved_columns
 from cspr_jax.motion.answers import Answers
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import answers_of, judge_all_robots, proofs_of
+from cspr_jax.verification.proved_answers import answers_of, proofs_of, verify_all_robots
 
 
 class FreeMap(ProvedMap):
@@ -44,7 +44,7 @@ class FreeMap(ProvedMap):
         at_ends, at_starts = self._at_rest(ends), self._at_rest(starts)
         stays = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE
         out = np.array(
-            [(a.verdict | b.verdict) & OF_PLACES for a, b in zip(at_ends.proof, at_starts.proof, strict=True)]
+            [(a.verdict | b.verdict) & OF_POSITIONS for a, b in zip(at_ends.proof, at_starts.proof, strict=True)]
         )
         columns = proved_columns(at_ends)
         for name, column in columns.items():
@@ -65,7 +65,7 @@ class FreeMap(ProvedMap):
         ends: np.ndarray,
         z0: np.ndarray | None,
     ) -> None:
-        # Fill in what is found of some cells.
+        # Fill in the answers of some cells.
         pairs = np.stack([starts[cells], ends[cells]], axis=1)
         units = None if self._unit is None else self._frame.rotated_quaternions(np.tile(self._unit, (2, 1)))
         accelerations = np.full((2, 3 if units is None else 6), np.nan)
@@ -85,7 +85,7 @@ class FreeMap(ProvedMap):
                 columns[name][reached] = column
 
     def _at_rest(self, positions: np.ndarray) -> Answers:
-        # A second of rest in each position.
+        # A motion at rest for one second at each position.
         motions = [
             Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), self._turning())
             for position in positions
@@ -93,7 +93,7 @@ class FreeMap(ProvedMap):
         splines = SplineBatch(motions)
         proofs = proofs_of(self._problem, splines.bounds, splines.durations, self._scene, splines.jumps)
         answers = answers_of(proofs, splines.durations)
-        judge_all_robots(self._problem, answers, motions, self._scene)
+        verify_all_robots(self._problem, answers, motions, self._scene)
         return answers
 
     def _turning(self) -> Array | None:

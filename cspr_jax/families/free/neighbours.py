@@ -1,7 +1,7 @@
 """Search for the fastest motions of many pairs of poses on few intervals, from few starts and from neighbours' motions.
 
-Only where a neighbour is much faster, or where nothing is found, its motion is moved to the own poses, and a search
-begins from there.
+Where a neighbour is much faster, or where nothing is found, the neighbour's motion is moved to the pair's own poses,
+and a search begins from it.
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,15 @@ from cspr_jax.families.free.search.interior_point import BARRIERS, optima, start
 from cspr_jax.families.free.search.starts import starts
 from cspr_jax.families.free.search.tasks import Tasks
 
-# Numbers of the starts from which searches begin: a line, and swings of one arc and of two.
+# Indices of the starts from which searches begin: a line, and swings of one arc and of two.
 FIRST = (0, 1, 3)
 # Weight of the barriers, and softness, of a search from a start, and from a neighbour's motion.
 FROM_START, FROM_NEIGHBOUR = (BARRIERS[0], 10.0), (1e-2, 1.0)
-# Neighbours of a pair; how many of them can help; part of its time by which one must be faster, besides the distance
-# over the length; largest ratio of lengths that counts.
-NEAR, VISITS, FASTER, RATIO = 8, 2, 0.02, 2.0
+NEAR = 8  # neighbours of a pair
+VISITS = 2  # rounds in which neighbours can help
+# A neighbour's motion is tried if it is faster by this fraction, plus the distance of the poses over their length.
+FASTER = 0.02
+RATIO = 2.0  # largest ratio of lengths by which times are scaled
 
 
 class Neighbours:
@@ -31,7 +33,7 @@ class Neighbours:
     """
 
     def __init__(self, tasks: Tasks, depths: Sequence[float]) -> None:
-        """Begin without any."""
+        """Begin without motions."""
         self._tasks, self._depths, count = tasks, depths, len(depths)
         self.controls = np.zeros((count, tasks.basis.controls, tasks.ends.shape[-1]))
         self.duration = np.full(count, np.inf)
@@ -46,7 +48,7 @@ class Neighbours:
 
     @property
     def lacking(self) -> np.ndarray:
-        """Numbers of the pairs for which nothing is found."""
+        """Indices of the pairs for which nothing is found."""
         return np.flatnonzero(~np.isfinite(self.duration))
 
     def search(self) -> None:
@@ -63,7 +65,7 @@ class Neighbours:
         self._improve(np.repeat(pairs, len(chosen)), controls, duration, FROM_START)
 
     def _improve(self, pairs: np.ndarray, controls: np.ndarray, duration: np.ndarray, how: tuple[float, float]) -> None:
-        # Search from motions, none or several ones for a pair.
+        # Search from motions, of which a pair may have none or several.
         tasks = self._tasks.take(pairs)
         result = optima(tasks, started(tasks, controls[:, None], duration[:, None], how[0]), *how)
         times = np.where(result.is_optimal, result.unknowns.duration[:, 0], np.inf)
@@ -78,7 +80,7 @@ class Neighbours:
         ratio = np.clip(self._lengths[pairs] / np.maximum(self._lengths[others], 1e-9), 1.0 / RATIO, RATIO)
         fraction = 1.0 + FASTER + self._distance / longest
         for _ in range(VISITS):
-            # A motion is tried once.
+            # Each motion is tried only once.
             expected = self.duration[others] * np.sqrt(ratio)
             helps = (expected * fraction < self.duration[pairs]) & (self.duration[others] < self._tried)
             best = np.full(len(self.duration), np.inf)

@@ -1,7 +1,7 @@
 """Motions of other families in place of what a search finds, where they are faster, or it finds nothing.
 
-Splines follow them, at poses exactly. Orientations are splines of quaternions of their own, and no Rodrigues vectors:
-motions of platforms may swing further than half a turn from the orientation in the middle, where these end.
+Splines follow these motions, and equal them at the poses. Their orientations are splines of quaternions: a platform
+may turn by more than half a turn from the orientation in the middle, where Rodrigues vectors go to infinity.
 """
 
 from __future__ import annotations
@@ -49,14 +49,16 @@ def followed(tasks: Tasks, motions: list[Motion], duration: Float[np.ndarray, "s
     splines = motions_of(tasks, unknowns, z0)
     if not len(about):
         return splines
-    turnings = [_turning(tasks, i, *pair) for i, pair in enumerate(zip(motions, duration.tolist(), strict=True))]
+    orientations = [
+        _orientation_pieces(tasks, i, *pair) for i, pair in enumerate(zip(motions, duration.tolist(), strict=True))
+    ]
     return [
         dataclasses.replace(spline, quaternion=as_float64(table))
-        for spline, table in zip(splines, turnings, strict=True)
+        for spline, table in zip(splines, orientations, strict=True)
     ]
 
 
-def _turning(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.ndarray:
+def _orientation_pieces(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.ndarray:
     # Bernstein coefficients (m, 6, 4) of quaternions that do not jump to their negatives.
     basis, (along, about) = tasks.basis, coordinates(tasks.robot.pattern)
     quaternions = np.array(states_at(motion, basis.averages).quaternion)
@@ -64,12 +66,12 @@ def _turning(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.
     quaternions[1:] *= np.where(np.cumsum(turns_over) % 2 == 1, -1.0, 1.0)[:, None]
     controls, ends = basis.fit @ quaternions, states_at(motion, np.array([0.0, 1.0]))
     for side, pose in ((0, segment), (-1, segment + 1)):
-        spin = np.zeros(4)
-        spin[1:] = np.asarray(ends.angular_acceleration)[side]
+        turning = np.zeros(4)
+        turning[1:] = np.asarray(ends.angular_acceleration)[side]
         if not tasks.is_free[0, pose]:
-            spin[1 + about] = tasks.accelerations[0, pose, len(along) :]
-        # A quaternion at rest has the second derivative of half its product with the angular acceleration.
-        second_derivative = 0.5 * products(spin[None], quaternions[side][None])[0]
+            turning[1 + about] = tasks.accelerations[0, pose, len(along) :]
+        # At rest q'' = alpha q / 2, with the angular acceleration alpha.
+        second_derivative = 0.5 * products(turning[None], quaternions[side][None])[0]
         outer = [quaternions[side]] * (OUTER - 1) + [
             quaternions[side] + basis.acceleration_step * duration**2 * second_derivative
         ]
@@ -89,12 +91,12 @@ def _tensions(robot: AnyRobot, limits: Limits, motion: Motion, tau: Array) -> Ar
     return jax.vmap(lambda one: tensions(robot, motion.state(one), limits))(tau)
 
 
-# Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
+# Intervals per half swing of a spline that follows a closed form, and how often they are doubled.
 INTERVALS, DOUBLINGS = 16, 3
 
 
 def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
-    """Tell whether closed forms may take the place of a motion: an arc takes about half a swing."""
+    """Tell whether closed forms may be better than a motion: if it takes longer than the swings it started from."""
     if not free.answers.feasible.all():
         return True
     return settings.objective == "time" and free.duration > ARCS * len(free.motions) * half_swing(problem, poses)
@@ -124,7 +126,7 @@ def no_slower(
 def _followed(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
 ) -> FreeMotion | None:
-    # The spline of so many intervals that it is proved; at the poses it has the accelerations that these have.
+    # Double the intervals of the spline until it is proved; at the poses it has the accelerations of the closed form.
     question = FreeQuestion.of(problem, scene, poses, settings)
     arcs = float(form.duration.max()) / half_swing(problem, poses)
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
@@ -139,10 +141,10 @@ def _followed(
     return None
 
 
-def stood_in(
+def lines_instead(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
 ) -> FreeMotion:
-    """Lines in place of a search that has been stopped before it has found anything."""
+    """Lines in place of a search that was stopped without a result."""
     motions, answers = cast(list[Spline], line.motions), cast(Answers, line.answers)
     energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
     families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
@@ -157,14 +159,14 @@ def no_slower_than_lines(
     settings: FreeSettings,
     lines: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """A motion of whose segments none is slower than a line between the same poses, or missing beside one."""
+    """A motion with lines for those of its segments that are slower than a line, or not feasible where a line is."""
     for line in lines:
         is_better = ~free.answers.feasible
         if settings.objective == "time":
             is_better |= line.duration < free.answers.duration
         indices = np.flatnonzero(is_better & fits(line, problem, poses, settings))
         if len(indices):
-            free = _with(free, stood_in(problem, scene, poses, settings, line), indices)
+            free = _with(free, lines_instead(problem, scene, poses, settings, line), indices)
     return free
 
 
@@ -180,13 +182,13 @@ def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion
 
 
 def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Bool[np.ndarray, "n"]:
-    """Tell whether lines are proved, short enough, and accelerate at the poses as is asked."""
+    """Tell whether lines are proved, short enough, and have the accelerations that the poses prescribe."""
     is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
     return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
 
 
 def _accelerations_missed(line: ClosedForm, poses: FreePoses) -> np.ndarray:
-    # By how much accelerations differ from those that are asked for, at most, (n,) m/s^2 or rad/s^2.
+    # Largest differences from the prescribed accelerations, (n,) m/s^2 or rad/s^2.
     missed = np.zeros(len(line.motions))
     for k, motion in enumerate(line.motions):
         state, requested = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]

@@ -26,9 +26,9 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.statics.wrench_balance import at_rest
-from cspr_jax.verification.criteria import judged_poses
+from cspr_jax.verification.criteria import pose_conditions
 
-# Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
+# Along a segment the determinant, and the depth below the spools, stay above this fraction of the smaller end value.
 REGULAR, SHALLOW = 1e-2, 0.5
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -41,8 +41,8 @@ class FreePoses(NamedTuple):
         quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
         velocities: (k, 3) m/s; platforms do not turn.
         accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations behind them, rad/s^2; a row with a
-            NaN: free.
-        z0: depth of P0, about which the motions swing from which searches begin, m.
+            NaN leaves them free.
+        z0: depth of P0, m; motions from which searches start swing about P0.
     """
 
     positions: np.ndarray
@@ -92,8 +92,8 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
         ends[:, side, len(along) :] = vector[:, about]
         for i, v in enumerate(vector):
             across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-            spin = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
-            turns[i, side, len(along) :, len(along) :] = np.linalg.inv(spin[np.ix_(about, about)])
+            to_angular_velocity = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
+            turns[i, side, len(along) :, len(along) :] = np.linalg.inv(to_angular_velocity[np.ix_(about, about)])
     accelerations = np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1)
     return _Joined(ends, velocities, references, turns, accelerations)
 
@@ -110,16 +110,16 @@ def _determinants(robot: AnyRobot, positions: Array, quaternions: Array) -> Arra
 
 
 def half_swing(problem: Problem, poses: FreePoses) -> float:
-    """Duration of half a swing about P0, over which durations count."""
+    """Duration of half a swing about P0, the unit of durations in the objective."""
     return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
 
 
 def divided(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "n 3"]:
     """Segments whose ends lie on opposite sides of singular poses.
 
-    Every motion between them passes one, where the cables cannot carry every wrench, so that none is proved.
+    Every motion between them passes a singular pose, where the cables cannot carry every wrench, and cannot be proved.
     """
-    if not judged_poses(problem.robot)[0]:
+    if not pose_conditions(problem.robot)[0]:
         return np.zeros((0, 3))
     values = determinants(problem, poses)
     crossings = np.flatnonzero(values[:-1] * values[1:] < 0.0)
@@ -127,8 +127,8 @@ def divided(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "n 3"]:
 
 
 def _sides(values: np.ndarray, part: float, cap: float = np.inf) -> np.ndarray:
-    # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side
-    # of both ends, by this part of the smaller value, or by so much.
+    # Bounds (2, s) of a value that is zero at singular poses, from its values (k,) at the poses: along a segment it
+    # keeps the sign of both ends, and at least `part` of the smaller magnitude, or `cap` if that is less.
     ends = np.stack([values[:-1], values[1:]])
     minimum = np.minimum(part * np.abs(ends).min(0), cap)
     return np.stack([np.where((ends > 0.0).all(0), minimum, -np.inf), np.where((ends < 0.0).all(0), -minimum, np.inf)])
@@ -172,7 +172,7 @@ def tasks_of(
 
 
 def segments_of(tasks: Tasks) -> Tasks:
-    """Segments of tasks as tasks of their own, one behind another."""
+    """Segments of tasks as tasks of their own, in one batch."""
 
     def one(part: np.ndarray) -> np.ndarray:
         return part.reshape(-1, 1, *part.shape[2:])

@@ -16,14 +16,13 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
 
-# Slack that is left after tightening, in the units of values; smallest and largest part by which bounds tighten, the
-# latter times half their range where that is above 1; by what part of it those of the next pieces do.
-LEFT, STEP, MAX_PART, BESIDE = 1e-7, 1e-6, 0.03, 0.5
-# By what more than is missed they tighten; from what time on by its powers, since some motions change with each step.
-MORE, PATIENCE = 1.5, 4
-# Samples of each interval, of point masses and of platforms: between two of them, the tensions of platforms change
-# more.
-SAMPLES = 4, 8
+LEFT = 1e-7  # slack that a proof must find, in the units of values
+STEP = 1e-6  # by which bounds tighten at least
+MAX_PART = 0.03  # by which bounds tighten at most, over half their range or 1, whichever is larger
+BESIDE = 0.5  # tightening of the neighbouring pieces, over that of the piece
+MORE = 1.5  # tightening over the slack that is missing
+PATIENCE = 4  # rounds after which the factor is a growing power of `MORE`, since some motions change in every round
+SAMPLES = 4, 8  # of each interval, of point masses and of platforms, whose tensions change more between two of them
 
 
 class FreeSettings(NamedTuple):
@@ -53,7 +52,7 @@ def planned_problem(problem: Problem) -> Problem:
 
 @dataclasses.dataclass(frozen=True)
 class FreeQuestion:
-    """The best motion through poses within limits is sought.
+    """Question of a search: the best motion through poses within limits.
 
     Fields:
         limits: bounds of the values at each sample.
@@ -98,12 +97,12 @@ class FreeQuestion:
 
 
 def more(number: int) -> float:
-    """By what more than is missed bounds tighten."""
+    """How much bounds tighten in a round, over what is missed."""
     return MORE ** max(1, number - PATIENCE + 1)
 
 
 def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
-    """Slacks of motions, one behind the other, over their pieces."""
+    """Slacks of consecutive motions over their pieces."""
     full = chained(motions)
     return piece_slacks(question.problem, full, np.asarray(full.knots), question.scene)
 
@@ -121,7 +120,7 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
     steps = np.where(
         missed > 0.0, np.minimum(more(number) * missed + STEP, MAX_PART * range_of_values), 0.0
     ) / np.where(unit > 0.0, unit, 1.0)
-    # A slack that is smallest beside a border depends on the bounds of the next piece as much.
+    # A slack that is smallest near the end of a piece depends as much on the bounds of the next piece.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
     near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])

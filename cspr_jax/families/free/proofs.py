@@ -16,11 +16,11 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.verification.piece_slacks import PieceSlacks
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Rounds of proof and tightening, and rounds before in which slack is left for all robots.
+# Rounds of proof and tightening, and earlier rounds that leave slack for all robots.
 ROUNDS, WIDER = 10, 3
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
 ON = ((1e-5, 1e-2), (1e-4, 1e-1), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Part of an uncertainty, by which the search goes first where it finds no motion for all of it.
+# Fraction of an uncertainty for which a motion is sought first if none is found for the whole.
 PART = 0.5
 
 
@@ -30,8 +30,8 @@ class FreeProof(NamedTuple):
     Fields:
         tasks: one, with the bounds within which the motion is the best one.
         unknowns: of it.
-        motions: one a segment.
-        answers: of them, of the planned robot alone.
+        motions: one per segment.
+        answers: of the motions, for the planned robot alone.
         is_stopped: whether Ctrl-C, or its time, has ended the search.
     """
 
@@ -100,7 +100,7 @@ def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Ta
 def robust_proof(
     question: FreeQuestion, uncertainty: Uncertainty, tasks: Tasks, unknowns: Unknowns
 ) -> FreeProof | None:
-    """The best motion for all robots within an uncertainty, from that of the planned robot."""
+    """The best motion for all robots within an uncertainty, searched from that of the planned robot."""
     all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
     try:
         full = _with_slack(all_robots, tasks, tasks, unknowns)

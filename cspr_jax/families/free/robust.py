@@ -1,12 +1,11 @@
 """Bounds of a search that leave slack for all robots within an uncertainty.
 
 Tensions and speeds of cables of other robots differ from those of the planned one by amounts that depend little on the
-motion. So bounds of the planned robot tighten at each sample by what is proved that a slack loses there, of a motion
-that was found before; a few rounds find the motion to which its own losses belong.
+motion. So bounds of the planned robot tighten at each sample by the proved loss of slack along the motion found before;
+after a few rounds the losses are those of the motion itself.
 
-Near the plane of the spools this is not so: there, losses grow as the inverse of the depth below the plane, and with
-the tensions themselves. Where they are a large fraction of these, a point mass stays deeper, until they are that
-fraction.
+Near the plane of the spools losses do depend on the motion: they grow as the inverse of the depth below the plane, and
+with the tensions themselves. Where they are a large fraction of the tensions, a point mass stays deeper.
 """
 
 import dataclasses
@@ -25,9 +24,10 @@ from cspr_jax.verification.piece_slacks import all_robots_slacks, short_blocks
 
 # Multiple of an uncertainty for which the search leaves slack, so that blocks of the proof need not be very short.
 MULTIPLE = 1.02
-# Largest loss of a slack over half the range of the value that it bounds. Near the plane of the spools: largest loss of
-# a tension over the largest tension there; by what depths grow in a round at most, and up to what part of the poses'.
-LARGEST, FRACTION, DEEPER, ABOVE = 0.5, 0.25, 4.0, 0.5
+LARGEST = 0.5  # loss of a slack, at most, over half the range of the value that it bounds
+FRACTION = 0.25  # loss of a tension over the largest one, above which the motion must stay deeper below the spools
+DEEPER = 4.0  # factor by which depths grow in a round, at most
+ABOVE = 0.5  # largest depth that is asked for, over that of the poses
 # Tensions, and the depth on which their losses depend.
 DEPENDING = Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS
 
@@ -76,8 +76,8 @@ def _states(tasks: Tasks, motions: list[Spline]) -> StateBounds:
 def _depths(
     question: FreeQuestion, states: StateBounds, slacks: np.ndarray, lost: np.ndarray, samples: int
 ) -> np.ndarray | None:
-    # Lower bounds of values (k, n_values), of depths below the spools, from slacks and losses (k, n_criteria), with the
-    # number of samples of each segment.
+    # Lower bounds of the depth below the spools, among those of all values (k, n_values), from slacks and losses
+    # (k, n_criteria); `samples` is the number of samples of each segment.
     problem, limits = question.problem, question.limits
     all_criteria = criteria(problem.robot, problem.limits, question.scene)
     taut, below = ([k for k, criterion in enumerate(all_criteria) if criterion.flag == flag] for flag in DEPENDING)
@@ -86,7 +86,7 @@ def _depths(
     tensions = slacks[:, taut] + [all_criteria[k].allowed for k in taut]
     deeper = np.minimum(lost[:, taut].max(1) / (FRACTION * np.abs(tensions).max(1)), DEEPER)
     depth = np.asarray(states.position.middle) @ np.asarray(plane_normal(problem.robot))
-    # The poses are where they are.
+    # The poses stay where they are, so depths are limited by those of the ends.
     of_segments = depth.reshape(-1, samples)
     ends = np.repeat(np.minimum(of_segments[:, 0], of_segments[:, -1]), samples)
     change = limits.rises[below].sum(0)

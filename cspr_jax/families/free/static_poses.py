@@ -18,9 +18,9 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Criteria of a position alone, which no motion to it meets where it does not; where a robot is to rest, all are.
-_OF_PLACES = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
-OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
+# Criteria that depend on the position alone: if a pose breaks one, so does every motion to it. At rest all do so.
+_OF_POSITIONS = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
+OF_POSITIONS = functools.reduce(operator.or_, _OF_POSITIONS)
 
 
 def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame: Frame) -> tuple[int, Cause] | None:
@@ -39,6 +39,6 @@ def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame
         rests = not (poses.accelerations[i].any() or poses.velocities[i].any())
         causes = answers.causes_of(i, frame) if answers.proof[i].broken.any() else ()
         for cause in causes:
-            if rests or Verdict[cause.criterion.upper()] & OF_PLACES:
+            if rests or Verdict[cause.criterion.upper()] & OF_POSITIONS:
                 return i, dataclasses.replace(cause, t=np.nan)
     return None

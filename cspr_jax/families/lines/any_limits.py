@@ -29,9 +29,10 @@ LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Fractions by which the duration of a search is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
-# The acceleration of a cable has a peak where the cable is short: samples lie at so many of its shortest lengths to
-# both sides of that point, on the line; halvings find their times.
-BESIDE, HALVINGS = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3), 45
+# The acceleration of a cable has a peak where the cable is short: samples lie on both sides of that point on the line,
+# at these distances over the shortest length.
+BESIDE = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3)
+HALVINGS = 45  # that find the times of these samples
 
 
 class Gain(NamedTuple):
@@ -82,7 +83,7 @@ def gain(
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
-    # Samples of s'' miss its peak, which the law knows.
+    # Samples of s'' miss its peak, for which the law has a formula.
     high = jnp.minimum(jnp.min(above), largest / law.largest[2])
     q_range = Gain(high, jnp.max(below), up, down)
     if "cable_acceleration_max" not in line.largest:
@@ -119,7 +120,7 @@ def _near_spools(
     at = LineStates(position, speed**2, second_derivative)
     line = jax.tree.map(lambda x: x[None, None], line)
     groups = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
-    # Parabolas are not laid here, since knots of the law lie between these samples.
+    # No parabolas between these samples, since knots of the law lie there.
     return _above(jnp.ones_like(groups), 1.0 - groups, jnp.zeros_like(groups, bool)), tau[..., None]
 
 

@@ -25,12 +25,12 @@ from cspr_jax.verification.proved_verdicts import Verdicts
 # Lines that a thread computes at a time, where there is something to search or to prove.
 PART = 256
 Table = TypeVar("Table", Durations, Verdicts)
-# Ends nearer to each other than this, over the largest coordinate of its spools, are one position.
+# Ends nearer to each other than this, over the largest coordinate of the spools, are the same position.
 SAME_PLACE = 1e-12
 # Lines that pass a spool nearer than this, over that coordinate, go through it.
 THROUGH = 1e-9
-# Flags that rest at an end raises: no motion avoids `OF_PLACES` there, and no motion starts with `NO_MOTION`.
-OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
+# Flags that rest at an end raises: no motion avoids `OF_POSITIONS` there, and no motion starts with `NO_MOTION`.
+OF_POSITIONS = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
 # Duration from which on a motion counts as standing still, over the time of a fall by the robot's radius and the line.
 STANDING = 1e4
@@ -67,8 +67,8 @@ def fastest(
     if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
         return _fastest(problem, starts, ends, **how)
     parts = in_parts(lambda part: _fastest(problem, starts[part], ends[part], **how), len(starts), PART)
-    durations, judgements, moves = zip(*parts, strict=True)
-    return Fastest(_joined(Durations, durations), _joined(Verdicts, judgements), np.concatenate(moves))
+    durations, results, moves = zip(*parts, strict=True)
+    return Fastest(_joined(Durations, durations), _joined(Verdicts, results), np.concatenate(moves))
 
 
 def _joined(kind: type[Table], parts: Sequence[Table]) -> Table:
@@ -87,31 +87,31 @@ def _fastest(
 ) -> Fastest:
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     timings = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
-    judgements, may_move, in_place = _at_rest(problem, starts, ends, timings)
+    results, may_move, in_place = _at_rest(problem, starts, ends, timings)
     verdicts_of = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
-        # The durations that the formulas promise without limits need no proof, but where the digits of p or T - p are
-        # lost, or the peak of the acceleration may lie beyond its limit.
+        # The durations of the formulas without limits need no proof, except where the digits of p or T - p are lost, or
+        # the peak of the acceleration may lie beyond its limit.
         is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
         is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
         indices = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
         if len(indices) > 0:
-            judgements.replace(indices, verdicts_of(starts[indices], ends[indices], timings.part(indices)))
+            results.replace(indices, verdicts_of(starts[indices], ends[indices], timings.part(indices)))
     # If an end breaks a limit, no other motion helps.
-    indices = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
+    indices = np.flatnonzero(may_move & in_place & ((results.verdict != 0) | ~in_plane))
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(indices) > 0:
         before, positions = timings.part(indices), (starts[indices], ends[indices])
         searched = by_search(problem, *positions, before, law=law, max_acceleration=max_acceleration)
-        reasons = _without_motion(problem, verdicts_of, *positions, searched, judgements.verdict[indices])
+        reasons = _without_motion(problem, verdicts_of, *positions, searched, results.verdict[indices])
         durations, part = _proved(verdicts_of, *positions, searched, reasons)
-        judgements.replace(indices, part)
+        results.replace(indices, part)
         timings.replace(indices, durations)
     moves = may_move & np.isfinite(timings.duration)
     indices = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.lower_bound == 0.0)))
     if len(indices) > 0:
         cells = by_cells(problem, starts[indices], ends[indices], max_acceleration)
         timings.lower_bound[indices] = np.maximum(timings.lower_bound[indices], cells)
-    return Fastest(timings, judgements, moves)
+    return Fastest(timings, results, moves)
 
 
 def _at_rest(
@@ -124,7 +124,7 @@ def _at_rest(
     above, slack = ~(timings.depth > 0.0), timings.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
     # If cables are slack, limits of their tensions say nothing more.
-    flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_PLACES)
+    flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_POSITIONS)
     flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
     rests = (flags == 0) & (timings.rest > doubt)
     open_ended = np.where(timings.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
@@ -173,7 +173,7 @@ def _proved(
     # Make the durations of a search longer until they are proved; without a motion, the flags from before stand.
     nothing = np.full(len(starts), np.nan)
     flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
-    judgements = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
+    results = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
     durations = timings.part(np.arange(len(starts)))
     durations.duration[~np.isfinite(timings.duration)] = np.nan
     open_lines = np.flatnonzero(np.isfinite(timings.duration))
@@ -182,6 +182,6 @@ def _proved(
             break
         durations.duration[open_lines] = timings.duration[open_lines] * (1.0 + longer)
         part = verdicts_of(starts[open_lines], ends[open_lines], durations.part(open_lines))
-        judgements.replace(open_lines, part)
+        results.replace(open_lines, part)
         open_lines = open_lines[part.verdict != 0]
-    return durations, judgements
+    return durations, results

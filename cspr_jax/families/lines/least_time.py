@@ -56,17 +56,17 @@ def least_times(
     max_acceleration: float = np.inf,
 ) -> LeastTimes:
     """Least durations along straight lines."""
-    timings, judgements, moves = fastest(
+    timings, results, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
     )
     # A refuted motion has no duration; the duration is 0 s where both ends are one position.
-    moves &= (judgements.verdict == 0) | (judgements.verdict == Verdict.UNDECIDED.value)
-    nothing = np.where((judgements.verdict == 0) & ~moves, 0.0, np.nan)
+    moves &= (results.verdict == 0) | (results.verdict == Verdict.UNDECIDED.value)
+    nothing = np.where((results.verdict == 0) & ~moves, 0.0, np.nan)
     duration, minimum = (np.where(moves, x, nothing) for x in (timings.duration, timings.lower_bound))
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = np.where(minimum > 0.0, duration / minimum, np.nan)
     return LeastTimes(
-        verdict=judgements.verdict,
+        verdict=results.verdict,
         duration=duration,
         acceleration_time=np.where(moves, timings.ratio, 0.5) * duration,
         least_duration=minimum,

@@ -3,12 +3,12 @@
 import numpy as np
 
 from cspr_jax.families.lines.least_time import least_times
-from cspr_jax.maps.from_places import FromPlacesMap
+from cspr_jax.maps.from_positions import FromPositionsMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 
-class LeastTimeMap(FromPlacesMap):
+class LeastTimeMap(FromPositionsMap):
     """The least duration of the S-model to each target; see `GridMap`."""
 
     proves = True

@@ -22,8 +22,8 @@ from cspr_jax.numerics.search.minima import Bracket, golden_step, inner_points
 from cspr_jax.numerics.shapes import Float
 
 ROUNDS = 24
-# Samples of half a motion by a law without a parameter, and golden sections between two of them.
-SAMPLES, SECTIONS = 128, 48
+SAMPLES = 128  # of half a motion by a law without a parameter
+SECTIONS = 48  # golden sections between two samples
 # Fraction by which a least duration is made longer, so that its margin is above rounding.
 LONGER = 1e-8
 

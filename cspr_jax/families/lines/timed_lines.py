@@ -56,7 +56,7 @@ def timed_lines(
     max_acceleration: float = np.inf,
 ) -> LineAnswers:
     """The fastest motions along straight lines by a law of time, proved."""
-    timings, judgements, moves = fastest(
+    timings, results, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
     )
     none, nothing = np.zeros(len(starts), int), np.full(len(starts), np.nan)
@@ -64,11 +64,11 @@ def timed_lines(
     return LineAnswers(
         none,
         none,
-        judgements.verdict,
+        results.verdict,
         duration,
-        judgements.margin,
-        judgements.bound,
-        judgements.limit_margin,
+        results.margin,
+        results.bound,
+        results.limit_margin,
         *(nothing, nothing, nothing),
         np.where(moves, timings.ratio, 0.5) * duration,
         np.where(moves, timings.lower_bound, np.nan),

@@ -126,7 +126,7 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
 def limits_at_rest(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
 ) -> Int[np.ndarray, "n"]:
-    """Limits that rest at either end breaks, not those that it touches."""
+    """Limits that a robot at rest at either end breaks; limits that it only touches do not count."""
     problem = touchable(problem)
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {

@@ -22,12 +22,12 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 
-# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
-# decimals of places, m.
-JUMP, DIGITS, DECIMALS = 0.01, 4, 5
-# Criteria that are named at most for what binds.
+JUMP = 0.01  # change of an acceleration, over the largest one, above which it jumps
+DIGITS = 4  # of numbers in lines
+DECIMALS = 5  # of positions, m
+# Largest number of criteria that are named as binding.
 MOST_BINDING = 10
-# Flags of what a slower motion may mend.
+# Flags of criteria that a slower motion may meet.
 OF_SPEED = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_motion), Verdict.WRENCH_INFEASIBLE)
 
 
@@ -36,7 +36,7 @@ class SectionAnswer(NamedTuple):
 
     Fields:
         least: its motion.
-        segments: (n_cells,) number of the segment in which each cell lies.
+        segments: (n_cells,) index of the segment in which each cell lies.
         ramp_time: of the plan, s.
         before: number of segments of the plan before the leg.
     """
@@ -52,12 +52,12 @@ class SectionAnswer(NamedTuple):
 
     @property
     def ends(self) -> tuple[int, int]:
-        """Numbers of the segments in which it begins and ends."""
+        """Indices of the segments in which it begins and ends."""
         return int(self.segments[0]), int(self.segments[-1])
 
     @property
     def jumps(self) -> int:
-        """Number of instants at which the acceleration jumps, those where it sets off from rest or stops included."""
+        """Number of times at which the acceleration jumps, those where it sets off from rest or stops included."""
         motion, width = self.least.motion, np.diff(np.asarray(self.least.motion.knots))
         points = np.asarray(motion.position)
         bends = np.linalg.norm(np.diff(points, 2, axis=1), axis=2) / width[:, None] ** 2
@@ -109,11 +109,11 @@ def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> Float[np.ndarra
 
 @dataclasses.dataclass(frozen=True)
 class PathCause(Cause):
-    """A place that no path speed passes, or an end whose speed is not possible.
+    """A point that no path speed passes, or an end whose speed is not possible.
 
     Fields:
-        s: of the place, from the start of its section, m.
-        position: the place, in the axes of the robot file, m.
+        s: of the point, from the start of its section, m.
+        position: the point, in the axes of the robot file, m.
         needs: whether the criterion needs the acceleration, and the other one forbids it.
         against: flag and cable of the other one; None: the speeds from which the rest of the path can be run along.
         end: "start" or "end" of the section, else "".
@@ -214,7 +214,7 @@ class PathAnswers(Answers):
         ]
 
     def causes_of(self, i: int, frame: Frame) -> tuple[Cause, ...]:
-        """Places that no path speed passes, then what no other speed mends; see `Answers.causes_of`."""
+        """Points that no path speed passes, then causes that no other speed removes; see `Answers.causes_of`."""
         usual, causes, before = super().causes_of(i, frame), list[Cause](), 0.0
         for section in self.sections[i]:
             times, failure = section.times(i), section.least.failure

@@ -23,9 +23,8 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-# By what part of their length lines are deflected. Time in which accelerations rise and fall where poses ask for
-# accelerations, s; else they jump.
-DEFLECTION, RAMP_TIME = 0.1, 0.05
+DEFLECTION = 0.1  # of lines, over their length
+RAMP_TIME = 0.05  # s; in which accelerations rise and fall where poses prescribe them; else they jump
 
 
 class FastestLines(Leg):
@@ -46,7 +45,7 @@ class FastestLines(Leg):
         left = [_in_order(problem, candidates) for candidates in lines]
         first = [candidates[0].curve for candidates in lines]
         answers, motions = proved_answers(problem, first, scene), list[Motion](first)
-        answers.verdict[:] = Verdict.UNDECIDED  # until a line is there
+        answers.verdict[:] = Verdict.UNDECIDED  # replaced where a line is found
         while unproved := [k for k, candidates in enumerate(left) if candidates and answers.verdict[k]]:
             times = least_times(problem, scene, [[left[k].pop(0)] for k in unproved], GRID, ramp_time)
             answers = replaced(answers, np.array(unproved), times.answers, np.arange(len(unproved)))
@@ -83,7 +82,7 @@ def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
 
 
 def _beside(ends: np.ndarray, dimensions: int) -> list[np.ndarray]:
-    # Places (3,) beside the middle of a line with two ends (2, 3), to both sides in a vertical plane and across it.
+    # Points (3,) beside the middle of a line with two ends (2, 3), to both sides in a vertical plane and across it.
     along, middle = ends[1] - ends[0], ends.mean(0)
     length = float(np.linalg.norm(along))
     if length <= SAME_PLACE:

@@ -34,7 +34,7 @@ SAME_DIRECTION = 1e-6
 FEW = 16
 # Cells of the grids of all sections: a proof takes no more blocks.
 MOST_CELLS = 100_000
-# Cells above which their number is said before the work begins.
+# With more cells than this, their number is announced before the work begins.
 MANY_CELLS = 10_000
 
 
@@ -42,8 +42,8 @@ class PathRun(NamedTuple):
     """Poses that one path joins.
 
     Fields:
-        first: number of the first pose, among those of the leg.
-        last: number of the last one.
+        first: index of the first pose, among those of the leg.
+        last: index of the last one.
         table: how they are joined.
     """
 
@@ -70,7 +70,7 @@ class Paths(Leg):
     """Poses joined along paths in the least time; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
-        """Refuse keys of other families, and what a path and its poses say twice."""
+        """Refuse keys of other families, and contradictions between a path and its poses."""
         super().__init__(waypoints)
         self._notes: list[str] = []
         self._refuse("arcs", "beta_hat")

@@ -1,4 +1,4 @@
-"""Maps of least durations along paths from one place to each target."""
+"""Maps of least durations along paths from one position to each target."""
 
 import numpy as np
 
@@ -64,6 +64,6 @@ class PathsMap(ProvedMap):
         return placed_inward(kept_to(self._pattern, curve, is_planar=False), self._frame, np.array(IDENTITY))
 
     def _at_rest(self, position: np.ndarray) -> Spline:
-        # A second of rest in a position.
+        # A motion at rest for one second.
         unit = None if self._unit is None else as_float64(self._unit[None, None])
         return self._placed(Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), unit))

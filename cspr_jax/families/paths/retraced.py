@@ -24,22 +24,21 @@ from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# Distance from the motion's path above which a piece is halved, m; how often; shortest time of the motion on it, s,
-# below which second derivatives in time are rounded too much.
-CLOSE, HALVINGS, BRIEF = 1e-8, 32, 4e-6
-# Angle by which a piece turns, rad, and ratio of the speeds at its ends, above which it is halved, too.
-TURN, RATIO = 0.1, 1.3
-# Pieces of a section at first, and of each smooth part.
-PIECES, FEWEST = 48, 4
-# Samples beside a stop from which the direction there follows, over the smooth part, and their weights.
+# A piece is halved while it is farther from the motion's path than this, m, turns by a larger angle, rad, or has a
+# larger ratio of speeds at its ends.
+CLOSE, TURN, RATIO = 1e-8, 0.1, 1.3
+HALVINGS = 32  # at most
+BRIEF = 4e-6  # s; pieces of a shorter time are not halved, since second derivatives in time are rounded too much
+PIECES, FEWEST = 48, 4  # of a section at first, and of each smooth part at least
+# Fractions of a smooth part at which samples beside a stop lie that give the direction there, and their weights.
 BESIDE, WEIGHTS = 1e-3 * np.arange(1.0, 5.0), np.array([4.0, -6.0, 4.0, -1.0])
-# Part by which the speed there may differ from the acceleration times the time where the motion sets off evenly.
+# Relative difference of the speed there from acceleration times time up to which the acceleration counts as constant.
 UNEVEN = 0.1
-# Inner samples of a piece at which its distance from the path is taken, and between them those of quadrature.
+# Each piece is divided here, as fractions of its time: for quadrature, and to compare the curve with the motion.
 QUARTERS = np.linspace(0.0, 1.0, 5)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 AXES = 3
-# Part of a speed by which the mass centre moves at least at ends that are no stops.
+# Except at stops, the mass centre moves at more than this fraction of the platform's speed, or the platform only turns.
 TURNS = 1e-6
 
 
@@ -49,7 +48,7 @@ class Retraced(NamedTuple):
     Fields:
         section: in the axes of the motions; its knots are ends of motions, and points where
             the motion almost stops.
-        segments: (k - 1,) numbers of the motions between its k knots.
+        segments: (k - 1,) indices of the motions between its k knots.
         speeds: of the mass centre at its start and at its end, m/s.
         accelerations: of the motions.
         deviation: largest distance of the section from the path, at samples, m.
@@ -97,7 +96,7 @@ def platform_radius(robot: AnyRobot) -> float:
 def retraced(
     robot: AnyRobot, motions: Sequence[Motion], cells: int, feeds: Sequence[np.ndarray | None] = ()
 ) -> list[Retraced]:
-    """Paths of motions that go on from each other."""
+    """Paths of consecutive motions, from each stop to the next."""
     sequence = MotionSequence(motions, platform_radius(robot))
     paths: list[Retraced] = []
     run: list[SmoothPart] = []
@@ -154,7 +153,8 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
 
 
 def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) -> np.ndarray:
-    # Tell for each piece whether direction or speed change much along it; from a stop on they always do.
+    # Tell for each piece whether direction or speed change much along it. Pieces at a stop, where speed always does,
+    # are left out.
     start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     speeds = np.stack([start.speed, end.speed])
     ratio = speeds.max(0) > RATIO * speeds.min(0)
@@ -168,7 +168,7 @@ def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) 
 def _path_accelerations(
     motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, curve: Spline
 ) -> PathAccelerations:
-    # Speeds change at both ends of the pieces as they do on their own side.
+    # At an end of a piece where the acceleration jumps, that on the side of the piece counts.
     start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     speed_rates = []
     for rates in (start, end):
@@ -227,10 +227,10 @@ def _curve(
 
 
 def _direction(beside: MovingPoints, times: np.ndarray) -> np.ndarray:
-    # Derivative along the path at a stop, from samples beside it, by times (2,) s from there on, or before it if < 0.
+    # Derivative along the path at a stop, from samples beside it, at times (2,) after the stop, s; before it if < 0.
     norm = np.linalg.norm(beside.acceleration[0])
     if abs(beside.speed[0] / abs(times[0]) - norm) < UNEVEN * norm:
-        # The motion sets off, or stops, as its acceleration says, which changes little.
+        # Beside the stop the acceleration hardly changes, and gives the direction.
         direction, acceleration = (2.0 * pair[0] - pair[1] for pair in (beside.second, beside.acceleration))
         return np.sign(times[0]) * direction / np.linalg.norm(acceleration)
     mean = WEIGHTS @ _derivatives(beside)[1]
@@ -247,7 +247,7 @@ def _derivatives(rates: MovingPoints) -> list[np.ndarray]:
 
 
 def _distances(off: np.ndarray, rates: MovingPoints, radius: float) -> np.ndarray:
-    # Lengths of what lies across the path; a quaternion is off by half of an angle.
+    # Lengths of the components across the path; quaternions differ by half of the angle between the orientations.
     off = np.concatenate([off[:, :AXES], 2.0 * radius * off[:, AXES:]], axis=1)
     along = np.concatenate([rates.first[:, :AXES], 2.0 * radius * rates.first[:, AXES:]], axis=1)
     along /= np.linalg.norm(along, axis=1, keepdims=True)

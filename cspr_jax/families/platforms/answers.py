@@ -155,7 +155,7 @@ def _reasons(
     named = np.zeros(len(basic), int)
     for flag, column in zip(checker.flags, broken.T, strict=True):
         named |= np.where(column, flag.value, 0)
-    # At a closer look some motions are proved except for limits, or for robots within the uncertainty.
+    # Some of these motions are proved except for limits, or for the planned robot alone.
     alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
     return np.where(by_limits, alone, basic | named)
 

@@ -26,11 +26,11 @@ CANDIDATES = 262_144
 # Times of the screen, in arcs before the end: first those at which most motions fail, in the order of how many they
 # refute; then those at which most of the others fail, with one beside the start, where the second derivative of the
 # amplitude function may be largest. They were chosen one by one among motions of the MSSM with three amplitude
-# functions; other times would be as right, and slower.
+# functions; other times would be correct too, but slower.
 FIRST_TIMES = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 OTHER_TIMES = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
-# The search for the best of infeasible candidates takes so many samples an arc.
+# Samples per arc in the search for the best of infeasible candidates.
 COARSEST = 4
 
 
@@ -97,7 +97,7 @@ class _Segments:
         ]
 
     def __call__(self, arcs: int, indices: np.ndarray) -> PlatformSegment:
-        # The indices (k,) number candidates.
+        # The indices (k,) are those of candidates.
         motion, (first, last) = self._candidates.motion[indices], self._candidates.beta_hats
         segments = take_segments(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
@@ -155,7 +155,7 @@ def _is_tried(arcs: int, only: np.ndarray) -> np.ndarray:
 
 
 def _times_before_end(arcs: int, before: np.ndarray) -> np.ndarray:
-    # Return times so many arcs before the end; of a shorter motion the start, where nothing fails.
+    # Return times so many arcs before the end; the start, where nothing fails, if the motion is shorter.
     return np.maximum(1.0 - before / arcs, 0.0)
 
 

@@ -15,7 +15,7 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_balance import determinant_ratio, is_regular
 
-# Larger values of beta-hat have never gained anything, docs/theory.md.
+# Larger values of beta-hat have never helped, docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
 # Poses that are computed in one call.
@@ -72,7 +72,7 @@ def end_options(
 
 
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:
-    """Choose an option for each pose of a sequence, so that the segments cost least in sum.
+    """Choose an option for each pose of a sequence, so that the total cost of the segments is smallest.
 
     Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
     infeasible segments.

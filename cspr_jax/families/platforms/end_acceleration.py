@@ -26,7 +26,7 @@ FLAT = 1e-12
 
 
 class Endpoint(NamedTuple):
-    """Tensions per mass and length at an end, offset + beta-hat derivative, and the values of beta-hat that they allow.
+    """Tensions per mass and length at an end, offset + derivative * beta-hat, and the beta-hat that they allow.
 
     Fields:
         offset: (n_cables,) 1/s^2.
@@ -54,13 +54,13 @@ def endpoint(
     zero = jnp.zeros(3)
     right = jnp.stack([jnp.concatenate([-eta * position, zero]), jnp.concatenate([zero, moment])], axis=1)
     offset, derivative = solved(matrix, right)[0].T  # (3.79)
-    # By (3.13) the translation asks for this combined tension, which is eta where both centroids are at the origin.
+    # The translation fixes the mean tension by (3.13); it is eta / n_cables if both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     mean_ray = jnp.mean(cables, axis=0)
-    even = eta * jnp.dot(position, mean_ray) / jnp.dot(mean_ray, mean_ray) / robot.n_cables
+    mean_tension = eta * jnp.dot(position, mean_ray) / jnp.dot(mean_ray, mean_ray) / robot.n_cables
     squared_norm = jnp.dot(derivative, derivative)
-    is_flat = squared_norm <= (FLAT * even) ** 2
-    preferred = -jnp.dot(offset - even, derivative) / jnp.where(is_flat, 1.0, squared_norm)  # (3.91)
+    is_flat = squared_norm <= (FLAT * mean_tension) ** 2
+    preferred = -jnp.dot(offset - mean_tension, derivative) / jnp.where(is_flat, 1.0, squared_norm)  # (3.91)
     where_slack = -offset / jnp.where(derivative == 0.0, 1.0, derivative)
     lowest = jnp.max(jnp.where(derivative > 0.0, where_slack, -jnp.inf))
     highest = jnp.min(jnp.where(derivative < 0.0, where_slack, jnp.inf))

@@ -37,11 +37,11 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.verification.fewest_limits import Refused
 
-# Tensions jump where the third derivative of the amplitude function changes across a knot by more than this part of its
-# largest value; and the distance from a knot at which it is compared.
-JUMP, NEAR_KNOT = 1e-6, 1e-12
+# The third derivative of the amplitude function jumps at a knot if it changes by this fraction of its largest value.
+JUMP = 1e-6
+NEAR_KNOT = 1e-12  # distance from a knot at which it is compared
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# A motion that only limits refuse counts as having so many more arcs: more than any sequence of feasible motions has.
+# Cost, in arcs, of a motion that only limits refuse: more than the arcs of any sequence of feasible motions.
 REFUSED = 100_000
 # Up to so many segments, compiling for large batches takes longer than it saves.
 FEW_SEGMENTS = 1000
@@ -80,7 +80,7 @@ class _Poses(Leg):
         points = waypoints.points(1.0)
         hint = "".join(f" ({line})" for line in plan_hints(waypoints.plan_file, waypoints.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
-            # On more than six cables poses are judged by the margin of their tensions alone.
+            # On more than six cables the margin of their tensions alone decides about poses.
             if not waypoints.poses[i].rest and _is_determined(problem):
                 _check_pose(problem.robot, waypoints.name(i), position, quaternion, waypoints.path, hint)
 
@@ -240,7 +240,7 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
 
 
 def _is_determined(problem: Problem) -> bool:
-    # Tell whether the motion determines the tensions, and a reference pose says what is singular.
+    # Tell whether the motion determines the tensions, so that the determinant of a reference pose is a scale.
     return problem.robot.n_cables == problem.robot.dof
 
 

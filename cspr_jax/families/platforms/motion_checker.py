@@ -18,7 +18,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
-# Cases of a batch for few and for many of them: a batch is always full, and each of these is compiled for.
+# Sizes of a batch, for few and for many motions: batches are filled up, so that only two sizes are compiled.
 FEW, MANY = 256, 2048
 TOUCH = 1e-6  # part of the platform's radius: poses of a plan must not be nearer to a contact
 BESIDE_KNOT = 1e-12
@@ -37,9 +37,9 @@ class PlatformChecks:
             is proved, as on more than six cables before `MotionChecker.confirmed`.
         refuted_tau: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a
             small step of it); NaN where it is not refuted, or by contacts that were only sampled.
-        tolerated: (n,) multiple of the uncertainty that the motion is proved to stand, 1 or 0 as far as verdicts need
-            it; NaN where no uncertainty is given, or the motion is not feasible as planned.
-        not_tolerated: (n,) multiple that the motion does not stand, likewise; infinite where none was found.
+        tolerated: (n,) multiple of the uncertainty that the motion is proved to tolerate; for verdicts alone, just 1 or
+            less; NaN where no uncertainty is given, or the motion is not feasible as planned.
+        not_tolerated: (n,) multiple that the motion does not tolerate, likewise; infinite where none was found.
     """
 
     verdict: np.ndarray
@@ -126,7 +126,7 @@ class MotionChecker(abc.ABC):
         return PlatformChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
     def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Tolerated:
-        """Multiples of the uncertainty that motions stand, as closely as possible."""
+        """Multiples of the uncertainty that motions tolerate, as closely as possible."""
         return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
 
     def confirmed(

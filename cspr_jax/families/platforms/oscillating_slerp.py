@@ -2,7 +2,7 @@
 
 The orientation runs back and forth through the reference orientation, between an envelope q_env and its
 inverse; the envelope goes slowly from the first orientation to the last, (3.59). With u the rotation vector of
-half the envelope's angle, q = exp(beta u): no angle is divided by, so that nothing is special about small ones.
+half the envelope's angle, q = exp(beta u): nothing is divided by an angle, so that small ones are no special case.
 The angle of the envelope stays within [0, pi], since both of its ends have a scalar part that is not negative.
 """
 
@@ -20,8 +20,8 @@ from cspr_jax.numerics.elementary import length, polynomial, sincospi
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.shapes import Bool, Float, Num
 
-# Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
-# these numbers, sin(r) / r where r^2 is below the other.
+# Series replace quotients in which digits would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below `_NEAR`, by so
+# many terms, and sin(r) / r where r^2 is small.
 _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 3))])]
 _SMALL, _SERIES = 0.5, 12

@@ -30,7 +30,7 @@ def rest_poses(z0: Float[np.ndarray, "n"]) -> Poses:
 
 def start_beta_hat(checker: MotionChecker, starts: Poses, z0: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """Beta-hat at starts beyond P0: the preferred one, of (3.91) or of the largest margin, else that at rest."""
-    # Starts are few, and options cost as much for each.
+    # Compute the options once for each of the few different starts.
     distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
     values = checker.end_options(distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
     return np.where(np.isnan(values), AT_REST, values)[inverse.ravel()]

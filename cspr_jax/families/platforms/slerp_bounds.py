@@ -12,11 +12,11 @@ from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, joined, no
 from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
-# Rounding of the derivatives that recurrences give, in parts of their magnitude or of 1, is less.
+# Bound of the rounding error of derivatives by recurrences, over their magnitude or 1.
 DERIVATIVE_ERROR = 1e-12
-# No derivative in y = r^2 of cos r, and of sin r / r of orders 0 to 2, has a larger second derivative: the n-th
-# derivative of the latter is a spherical Bessel function, (-1/2)^n j_n(r) / r^n, and largest at 0, where it is (-1/2)^n
-# / (1 3 5 ... (2 n + 1)).
+# Largest second derivatives in y = r^2 of cos r, of sin r / r, and of the first two derivatives of sin r / r. The n-th
+# derivative of sin r / r is (-1/2)^n j_n(r) / r^n with the spherical Bessel function j_n, and is largest at 0, where it
+# is (-1/2)^n / (1 3 5 ... (2 n + 1)).
 _SECOND_DERIVATIVES = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
 
 Bounds3 = tuple[AffineBounds, AffineBounds, AffineBounds]

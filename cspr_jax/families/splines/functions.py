@@ -67,7 +67,7 @@ class FunctionMotion:
 def function_motion(
     function: Callable, duration: float, *, frame: Frame, reference: Float[np.ndarray, "4"], is_platform: bool
 ) -> FunctionMotion:
-    """Motion that a function gives in the axes of a robot file, in those of the kernels."""
+    """Motion of a function that gives positions in the axes of a robot file, in the axes of the kernels."""
     try:
         shape = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
     except TypeError as error:

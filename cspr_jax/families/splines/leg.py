@@ -67,7 +67,7 @@ class Splines(Leg):
 
     @property
     def _runs(self) -> list[tuple[int, int]]:
-        # Numbers of the first and the last pose of each curve: a file, or poses up to one whose velocity is known.
+        # Indices of the first and the last pose of each curve: a file, or poses up to one whose velocity is given.
         poses, ends = self.waypoints.poses, []
         for i in range(1, len(self) + 1):
             stops_here = poses[i].rest or (poses[i].velocity is not None and not self._is_hermite)
@@ -134,7 +134,7 @@ class Splines(Leg):
             raise InputError("point", "origin", '"mass-centre", whose positions functions and motions give')
 
     def _cleaned(self, name: str, source: Any) -> Any:
-        # Take the noise off that the plan names, else tell it.
+        # Remove the noise if the plan states it, else report it.
         lines: list[str] = []
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.waypoints.robot_file.base_points))]
@@ -162,7 +162,7 @@ class Splines(Leg):
         for i in range(first, last + 1):
             time = waypoints.poses[i].time
             if time is None and (i > first or first > 0):
-                raise ConfigError(waypoints.path, f"{waypoints.name(i)}.time is missing: instant of the pose, s")
+                raise ConfigError(waypoints.path, f"{waypoints.name(i)}.time is missing: that of the pose, s")
             time = 0.0 if time is None else time
             if previous is not None and not time > previous:
                 raise ConfigError(

@@ -78,8 +78,8 @@ def decided(
 ) -> tuple[Answers, Segment]:
     """Answers from upper bounds."""
     precomputed = precomputed or ProvedArcs(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
-    with_limits = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
-    basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    with_limits = as_prescribed(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    basic = as_prescribed(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
     search = _search(problem, parities, with_limits, precomputed)
     smallest, bound = search.smallest, search.bound
     tried, slack, broken = _shown(problem, parities, search, with_limits, basic, measure)
@@ -124,8 +124,8 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Ar
     return jax.vmap(one)(segments)
 
 
-def only(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max_arcs"]:
-    """Upper bounds, without those that prescribed numbers of arcs rule out."""
+def as_prescribed(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max_arcs"]:
+    """Upper bounds, -inf for numbers of arcs other than the prescribed one, or smaller than a prescribed minimum."""
     if arcs is None:
         return upper
     fixed, number = np.asarray(arcs)[:, None], np.arange(1, upper.shape[1] + 1)
@@ -133,9 +133,9 @@ def only(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max
 
 
 class _Search(NamedTuple):
-    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin,
-    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty, and the
-    # limits that samples show candidates to break, (n, max_arcs, n_criteria).
+    # The smallest number of arcs proved feasible; whether a smaller one stayed undecided; the proved margin; whether
+    # some number of arcs is feasible for the planned robot, though perhaps not within the uncertainty; and the limits
+    # that candidates break at samples, (n, max_arcs, n_criteria).
     smallest: np.ndarray
     doubtful: np.ndarray
     bound: np.ndarray
@@ -250,14 +250,14 @@ def _largest_margins(
         rows = np.flatnonzero(is_open.any(1))
         if not len(rows):
             return tried, slack
-        # The next ones of each segment, as many as fit into a batch, which takes as long whatever it holds.
+        # The next ones of each segment, as many as fill a batch, which takes no longer when it is full.
         order = np.argsort(-upper[rows], axis=1, kind="stable")[:, : max(BATCH // len(rows), 1)]
         owner, turn = np.nonzero(np.take_along_axis(is_open[rows], order, axis=1))
         segment, arcs = rows[owner], order[owner, turn] + 1
         candidate, bound = measure(problem, pick(parities, segment, arcs), arcs), upper[segment, arcs - 1]
         upper[segment, arcs - 1] = -np.inf
         for rank in range(order.shape[1]):
-            # As if they came one by one: what else is in a batch must not decide between equals.
+            # Take them one by one, so that a choice between equals does not depend on what else is in the batch.
             due = np.flatnonzero((turn == rank) & (bound > _improvement(best)[segment]))
             due = due[candidate[due].min(1) > best[segment[due]]]
             row = segment[due]

@@ -38,7 +38,7 @@ def conservative_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float
     if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
         return float("nan")
     root = np.sqrt(inside)
-    with np.errstate(over="ignore"):  # a target a hair below the spools: no z0 will do
+    with np.errstate(over="ignore"):  # a target just below the spools: no z0 is deep enough
         lowest = float((square / (height + root)).max())
     if sine_squared > 0.0 and lowest >= float(((height + root) / sine_squared).min()):
         return float("nan")

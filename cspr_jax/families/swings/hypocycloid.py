@@ -12,7 +12,7 @@ cosine of p pi tau, which do not depend on the points. They agree to 1e-12 (test
 Degenerate cases. A rest end (a point at p0) makes the motion a straight line, delta = 0, and an odd
 p is allowed: its first swing goes away from the target. Where start and end lie on one line through
 p0 and the arcs still need a plane (psi = 0 with p odd, psi = pi with p even), the plane is the one
-least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `duration`.
+least inclined to the spool plane. psi = 0 with p = 1 has no duration: (2.47) is 0.
 """
 
 from __future__ import annotations
@@ -270,7 +270,7 @@ def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Arr
 def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Float[Array, ""]) -> Float[Array, ""]:
     """Smallest normalised pseudotension as the number of arcs of this parity grows, at one time.
 
-    1 - r(tau) |tilt . e_r(tau)|: exact, where (2.55) bounds the direction of the swing by the worst.
+    1 - r(tau) |tilt . e_r(tau)|: exact, whereas (2.55) assumes the worst direction of the swing.
     """
     r = segment.start_radius + (segment.end_radius - segment.start_radius) * derivatives(amplitude, tau, order=0)[0]
     lateral, axial = sincospi(segment.sense * segment.precession * tau)

@@ -107,8 +107,8 @@ def _measured(problem: Problem, *, segments: Segment, tried: np.ndarray, rows: n
 
 
 class _Trials:
-    # Trials of numbers of arcs, with the proved margin of each that is not refuted, and of those that fail the number
-    # with the largest sampled slack.
+    # Trials of numbers of arcs: the proved margins of those that are not refuted, and the number with the largest
+    # sampled slack among those that fail.
 
     def __init__(self, problem: Problem, parities: dict[int, Segment], count: int) -> None:
         self._problem, self._parities = problem, parities

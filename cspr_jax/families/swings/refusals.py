@@ -44,7 +44,7 @@ def refusals(
         while len(left):
             left = left[~fewest.is_best[rows[left]]]
             left = left[fewest.may_change(rows[left], refuted[rows[left], arcs[left] - 1])]
-            # The next ones of the same segments fill a batch, which takes as long whatever it holds.
+            # The next ones of the same segments fill the batch, which takes no longer when it is full.
             count = max(int(np.searchsorted(rank[left], rank[left[:1]], side="right").sum()), SMALL)
             batch, left = left[:count], left[count:]
             if len(batch):
@@ -57,8 +57,8 @@ def refusals(
 def _limits_of(
     problem: Problem, parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray, fewest: FewestLimits
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return which of some candidates with taut cables break limits that are certain, and these (n, n_criteria).
-    # Candidates that change nothing by the limits that samples show them to break are not proved.
+    # Return which candidates with taut cables are certain to break limits, and these limits, (n, n_criteria). A
+    # candidate whose samples already break all limits that are left is not proved: it changes nothing.
     segments = pick(parities, rows, arcs)
     coarse = first_pass(problem, segments, arcs.astype(float))
     is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC

@@ -4,8 +4,8 @@ With s from -1 at the start of a block to 1 at its end, f(s) is within `radius` 
 quotients and roots of such bounds are bounds again. A smooth function's radius shrinks with the square of the length of
 the block, so that halving a block decides what is open, and functions that only have to be continuous have bounds too.
 Models of the second order, `middle + linear s + square s^2`, shrink with the third power; few operations know them.
-Each operation adds what rounding may be to the radius. Operations are compiled functions: kernels of hundreds of them
-are traced, and written down for XLA, as calls of a few.
+Each operation adds a bound of its rounding error to the radius. Operations are compiled functions: kernels of hundreds
+of them are traced, and lowered for XLA, as calls of a few.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class AffineBounds(NamedTuple):
 
     Fields:
         middle: (...) of the line, at the middle of the block.
-        linear: (...) coefficient of s: half of what the line rises from the start to the end.
+        linear: (...) coefficient of s: half of the rise of the line from start to end.
         radius: (...) bound of the remainder; NaN where there is none.
         square: (...) coefficient of s^2; None: the remainder is that of a line.
     """
@@ -128,7 +128,7 @@ def _scaled(f: AffineBounds, constants: Array) -> AffineBounds:
 
 
 def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
-    # Bounds of f g but for rounding, and the magnitude of the numbers in its line; s^2 is between 0 and 1.
+    # Bounds of f g without rounding errors, and the magnitude of the numbers in its line; s^2 is between 0 and 1.
     if f.square is not None or g.square is not None:
         return _parabola_products(f, g)
     half = 0.5 * f.linear * g.linear

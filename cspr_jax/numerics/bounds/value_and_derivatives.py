@@ -45,7 +45,7 @@ class Bounds(NamedTuple):
         )
 
     def times(self, factor: Array | float) -> "Bounds":
-        """Bounds of factor f, for a constant factor (its sign does not matter)."""
+        """Bounds of f times a constant, whose sign does not matter."""
         magnitude = jnp.abs(factor)
         return Bounds(magnitude * self.value, magnitude * self.derivative, magnitude * self.curvature)
 

@@ -11,7 +11,7 @@ import numpy as np
 from cspr_jax.numerics.shapes import Float
 
 ROUNDS = 64
-# A bound and an attained value agree if they differ by no more than this part of the scale of the values.
+# A bound and an attained value agree if they differ by no more than this fraction of the scale of the values.
 AGREED = 1e-12
 # Halving ends after this many blocks: the bounds that are proved by then are the answer.
 MAX_BLOCKS = 2_000_000
@@ -33,8 +33,8 @@ class MinimumBlocks(NamedTuple):
     """Parts of the intervals.
 
     Fields:
-        case: (n_blocks,) number of the case.
-        piece: (n_blocks,) number of the piece of a piecewise function.
+        case: (n_blocks,) index of the case.
+        piece: (n_blocks,) index of the piece of a piecewise function.
         start: (n_blocks,) start of each block.
         width: (n_blocks,).
     """

@@ -13,8 +13,8 @@ from cspr_jax.numerics.shapes import Float, Int
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
-# Minima are refined around so many samples of each function, by so many points around each, round by round, each eight
-# times as fine as the last.
+# Minima are refined around so many samples of each function, by so many points around each; the points of each round
+# are eight times as dense as before.
 STARTS = 3
 POINTS = 17
 ROUNDS = 4
@@ -74,7 +74,7 @@ def vertex_values(
         earlier, later = rates[..., :-1, :], rates[..., 1:, :]
         square, rate = (later - earlier) / (before + after), (earlier * after + later * before) / (before + after)
         drop = rate**2 / (4.0 * square)
-    # Both sides of a joint tell nothing of how values change.
+    # The difference between both sides of a joint is a jump, and says nothing of derivatives.
     is_even = np.minimum(before, after) > EVEN * np.maximum(before, after)
     is_low = (earlier <= 0.0) & (later >= 0.0) & np.isfinite(drop) & is_even
     vertices[..., 1:-1, :] -= np.where(is_low, drop, 0.0)

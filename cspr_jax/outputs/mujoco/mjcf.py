@@ -30,10 +30,11 @@ KEYFRAME = "start"
 # Sizes of what is drawn, over the diagonal of the box around spools and path.
 MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
 THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
-# Of a pulley: where its cable comes from, below the entry point, and half its width, over its radius; its inertia over
-# the mass and the size squared, as little as MuJoCo takes well; distance of the points that keep it in the plane of its
-# cable, over the size.
-LEAD, WHEEL_WIDTH, SWIVEL_INERTIA, FOLLOWING = 0.5, 0.15, 1e-9, 0.1
+# Of a pulley:
+LEAD = 0.5  # length of cable below the entry point, over the radius
+WHEEL_WIDTH = 0.15  # half of its width, over the radius
+SWIVEL_INERTIA = 1e-9  # over mass and squared extent of the robot: the smallest with which MuJoCo works well
+FOLLOWING = 0.1  # distance of the points that keep it in the plane of its cable, over the extent of the robot
 SMALLEST_GAP = 0.01  # rad, between start and end of a tendon around a pulley
 LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # from z to -y
 CLEAR = (0.0, 0.0, 0.0, 0.0)

@@ -2,7 +2,7 @@
 
 World axes have z up: those of the robot file, turned by half a turn about x where its z points down. Tensions are at
 both ends and in the middle of each step of the integrator, RK4, which asks for them there. No step runs across an
-instant where the acceleration, or its derivative, may jump.
+time at which the acceleration, or its derivative, may jump.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
-# Parts of normalised time: rows at a jump are taken the first of them to either side of it, and jumps that are nearer
-# to each other than the second are one.
-BESIDE, ONE_JUMP = 4e-15, 1e-9
+# In normalised time:
+BESIDE = 4e-15  # distance from a jump of the rows on both sides of it
+ONE_JUMP = 1e-9  # jumps that are nearer to each other are one
 _SIGNS = {"up": (1.0, 1.0, 1.0), "down": (1.0, -1.0, -1.0)}
 
 
@@ -70,7 +70,7 @@ class Suspended(NamedTuple):
 
     @property
     def wheels(self) -> np.ndarray:
-        """Numbers, from 0 on, of the cables that leave from pulleys of some size."""
+        """Indices of the cables that leave from pulleys with a radius above 0."""
         return np.empty(0, int) if self.pulleys is None else np.flatnonzero(np.asarray(self.pulleys.radius) > 0.0)
 
 
@@ -221,7 +221,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
         # SciPy has the scalar last.
         rotation = Rotation.from_quat(np.roll(world.rotated_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()
-        # Nothing is added to the derivative in axes that turn: omega x omega is nil.
+        # The derivative is the same in axes that turn: omega x omega is zero.
         moved |= {name: back.apply(world.rotated(columns[name])) for name in ("omega", "omega_dot")}
         moved["rotation"] = rotation
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)

@@ -26,7 +26,7 @@ class PlayedPath(NamedTuple):
 
     Fields:
         position: (n, 3) of the mass centre, m.
-        rotated: (n,) angle from the planned orientation, rad; 0 of what does not turn.
+        rotated: (n,) angle from the planned orientation, rad; 0 for a point mass.
     """
 
     position: np.ndarray
@@ -194,7 +194,7 @@ def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_
     mujoco = need_mujoco()
     with _callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
-    # Pulleys are where the cables want them: what keeps them there has nothing to do.
+    # The pulleys are put where the cables lead, so that the constraints that keep them there are not needed.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
     rows, freedoms = ends_of_steps(moved), model.nv - len(body.wheels)
     data, (qpos, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)

@@ -10,7 +10,7 @@ from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.style.labels import value
 from cspr_jax.store.reading.result import Result
 
-# A value that is asked for and a point of an axis are the same but for rounding.
+# A requested value may lie outside the range of an axis by this fraction of its coordinates.
 SAME = 1e-9
 LONGEST_NAMES = 64  # letters of a first line that tell whose table it is
 

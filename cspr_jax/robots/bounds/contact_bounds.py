@@ -154,7 +154,7 @@ def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableB
         return _signed(bodies, cable, shape, depth_bound(cable, body.planes))
 
     low, high = jax.vmap(one)(starts, spools)
-    # A cable that may be as short as the part that is left out is not judged.
+    # A cable that may be as short as the part that is left out is not checked.
     is_long = cables.length.low() > bodies.leave
     return jnp.where(is_long, low, -bodies.deepest) - bodies.radii, jnp.where(is_long, high, jnp.inf) - bodies.radii
 

@@ -1,4 +1,4 @@
-"""Bounds of cables behind pulleys, over a block of time: direction, length, and what curves their second derivative.
+"""Bounds of cables behind pulleys, over a block of time: direction, length, and what swivelling adds to accelerations.
 
 Formulas are those of `robots.model.pulleys` and `robots.statics.cable_lengths`, in affine bounds. With phi the angle of
 the wrapped arc and phi_c its value in the middle of the bounds, the sine of phi - phi_c is linear in the direction; it

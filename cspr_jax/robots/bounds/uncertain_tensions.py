@@ -32,7 +32,7 @@ from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# Surplus of a solution, and smallest change of tensions, as parts of the largest of them.
+# Surplus of a solution, and smallest change of tensions, over the largest of them.
 SURPLUS = 1e-9
 # Rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS = 8

@@ -24,8 +24,8 @@ from cspr_jax.robots.model.shapes import Body, Box, Cylinder, Hull, Obstacle, Sp
 BATCH = 65_536
 # Few poses are computed in a batch of this length: a search asks for some at a time.
 FEW = 4096
-# The part of a cable next to its attachment point for which contacts with the platform do not count is so many
-# diameters long, or this part of the extent of the platform's shape.
+# Contacts with the platform do not count on the end of a cable next to its attachment point: so many diameters of it,
+# or this fraction of the extent of the platform's shape.
 LEAVE_DIAMETERS = 10.0
 LEAVE_FRACTION = 0.01
 # Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest

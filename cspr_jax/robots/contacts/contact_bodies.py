@@ -51,7 +51,7 @@ class Bodies(NamedTuple):
         order: (n_obstacles,) index of each obstacle among rods, and boxes behind them.
         body: shape of the platform in its axes; None: not known.
         leave: () length of each cable next to its attachment point that may meet the platform, m.
-        sectors: (n_cables, 2, 3) sides and (3,) normal of `interference.Contacts`; None: not judged.
+        sectors: (n_cables, 2, 3) sides and (3,) normal of `interference.Contacts`; None: not checked.
         extent: () largest coordinate, m.
         deepest: () m.
     """

@@ -44,7 +44,7 @@ class Solid(NamedTuple):
 
 
 class FacePlanes(NamedTuple):
-    """FacePlanes of the faces of a body that does not move.
+    """Planes of the faces of a body that does not move.
 
     Fields:
         normals: (n_faces, 3) outward unit normals.
@@ -61,7 +61,7 @@ class Features(NamedTuple):
     Fields:
         bodies: their edges and faces.
         kind: 0: edges; 1: a corner of the first and a face of the second; 2: the other way round.
-        first: number of that of the first body.
+        first: index of the edge, corner or face of the first body.
         second: likewise.
     """
 

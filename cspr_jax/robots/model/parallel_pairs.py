@@ -2,7 +2,7 @@
 
 The cables of a pair run from A and A' to B and B' with A - A' = B - B', and one winch keeps them equally long: a
 parallelogram, so that the platform only translates. With the mass centre P on the line through B and B', at
-B + lambda (B' - B), the moments of a pair about P vanish if and only if its tension is shared 1 - lambda to lambda. All
+B + lambda (B' - B), the moments of a pair about P vanish if and only if its tensions are as 1 - lambda to lambda. All
 forces then act at P, along cables that leave from A + lambda (A' - A) (Machines 11 (2), 2023, 224, section 2.2, which
 gives lambda = 1/2; any lambda follows in the same way).
 
@@ -20,9 +20,9 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.spool_plane import is_on_line, is_vertical
 
 COUNT = 6
-# Tolerance, as part of the largest distance of a spool from the centroid of all: for cables of a pair to be parallel,
-# and for the mass centre to lie on the line between them; as part of this line, the distance that the mass centre must
-# keep from its ends.
+# Tolerance, over the largest distance of a spool from the centroid of all, for cables of a pair to be parallel and for
+# the mass centre to lie on the line between them; distance of the mass centre from the ends of this line, over its
+# length.
 SAME_LINE = 1e-6
 # Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
 SMALLEST_MOMENTS = 1e-6

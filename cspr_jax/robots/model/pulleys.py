@@ -80,7 +80,7 @@ def exits(
 ) -> Exit:
     """Find where cables leave their pulleys."""
     ray = target - entry
-    # A root at 0, or what lies on the axis of no pulley, would have no derivative, also where it is not chosen.
+    # A root at 0, or a point on the axis without a pulley, would have no derivative, even where it is not selected.
     is_wheel = jnp.broadcast_to(radius > 0.0, ray.shape[:-1])
     high = jnp.sum(ray * axis, axis=-1)
     aside = ray - high[..., None] * axis

@@ -29,7 +29,7 @@ from cspr_jax.robots.statics import wrench_balance
 
 # Axes that differ less than this from the reference axes count as equal to them.
 ALIGNED = 1e-6
-# Cables count as slack below this part of the mean tension.
+# A cable counts as slack if its tension is a smaller fraction than this of the mean tension.
 SMALLEST_TENSION = 1e-6
 
 _CHANGE_LINES = (
@@ -124,7 +124,7 @@ def _standing(robot: PlatformRobot, center: Array) -> tuple[Array, Array]:
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
-    # Choose the side of the platform with which its points come nearer to being below their spools.
+    # Lay the platform flat on either side, turned so that its points are nearest to their spools; keep the nearer side.
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]

@@ -44,9 +44,8 @@ class Faces:
         apex: (..., n_components) wrench, or acceleration, of the smallest tensions.
         of_largest: (..., n_faces) whether a largest tension is reached on the face.
         is_regular: (...) whether the set has an inside: the cables span all d components.
-        closure: (...) margin of wrench closure, a pure number in [-1, 1], positive if the cables, pulled hard enough,
-            resist every wrench: the least, over all planes that d - 1 unit columns span, of the distance of the
-            farthest column on the emptier side.
+        closure: (...) margin of wrench closure, in [-1, 1], positive if the cables, pulled hard enough, resist every
+            wrench: how far columns reach beyond a plane of d - 1 unit columns, minimum over both sides of all planes.
     """
 
     normals: Array
@@ -88,9 +87,9 @@ def _subsets(count: int, n: int) -> np.ndarray:
 
 @functools.cache
 def _level(rows: int, columns: int, n: int) -> tuple[np.ndarray, ...]:
-    # Return how products of `n` columns follow from products of one column less: the parent and the last column of
-    # each choice of columns; for each choice of rows the row of the last column, the other rows, and the sign,
-    # (n_choices, n) each.
+    # Return how minors of `n` columns follow from those of n - 1 by expansion along the last column: for each choice of
+    # columns, the choice without its last one, and that last one; for each choice of rows, each of its rows, the choice
+    # of the other rows, and the sign, (n_choices, n) each.
     smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, n - 1).tolist())}
     chosen = _subsets(columns, n)
     parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
@@ -109,12 +108,12 @@ def spanning(count: int, dof: int) -> np.ndarray:
 def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices dof"]:
     """Normals to all choices of d - 1 columns: their generalised cross products."""
     dof, count = matrix.shape
-    products = matrix.T  # products of one column, by row
+    products = matrix.T  # minors of one column, by row
     for n in range(2, dof):
         parent, last, row, rest, sign = _level(dof, count, n)
         terms = products[parent][:, rest] * matrix.T[last][:, row]
         products = terms @ sign
-    # In the order of `_subsets`, the row that a product leaves out is the last one first.
+    # The first of `_subsets` leaves out the last row, and so on.
     signs = np.array([(-1.0) ** (dof - 1 - i) for i in range(dof)])
     return products[:, ::-1] * signs[None]
 
@@ -130,8 +129,8 @@ def one_sided_faces(
 ) -> Float[Array, "n_choices n_others"]:
     """Products of a normal to each choice of d - 1 cables with the other cables.
 
-    With up to two cables more than needed they are relations among the columns of the kernel, some thirty products in
-    place of determinants.
+    With up to two cables more than degrees of freedom they follow from the kernel, in some thirty multiplications
+    instead of determinants.
     """
     dof, count = matrix.shape
     chosen = beside_faces(count, dof)
@@ -140,7 +139,7 @@ def one_sided_faces(
         norm = jnp.linalg.norm(normals, axis=1)[:, None]
         along = jnp.take_along_axis(normals / jnp.where(norm > FLAT, norm, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
         return jnp.where((norm > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
-    # One row of the null space more than it has columns: the relation among them.
+    # The other cables' rows of the kernel are one more than it has columns: their linear relation has the products.
     rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
         return jnp.ones(chosen.shape)
@@ -157,7 +156,7 @@ def one_sided_faces(
 def face_distances(
     along: Float[Array, "n m"], slacks: Float[Array, "n"], weights: Float[Array, "n m"]
 ) -> Float[Array, "n"]:
-    """Distances of tensions from their limits at which a face is reached."""
+    """How far tensions lie within limits that shrink until a face is reached."""
     norms = jnp.sum(jnp.abs(along) * weights, axis=1)
     return jnp.where(norms > 0.0, slacks / jnp.where(norms > 0.0, norms, 1.0), jnp.inf)
 

@@ -1,7 +1,7 @@
 """The face of the set of wrenches that is nearest to a wrench, and the tensions that are most central there.
 
-A face's d - 1 cables span it; the others, n - d + 1, are all at one distance from a limit where tensions are as far
-from their limits as the face allows. With tensions t0 + N^T x, N without a wrench, these cables and the distance r obey
+A face's d - 1 cables span it; where tensions are as far from their limits as the face allows, the n - d + 1 others all
+have the same distance r from a limit. With tensions t0 + N^T x, N without a wrench, these cables and r obey
 N_S^T x - sign r = limit_S - t0_S, one small system.
 """
 
@@ -18,7 +18,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import beside_faces, face_distances, one_sided_faces, spanning
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
 
-# A tension without a largest value is held below so many times the largest that the wrench needs.
+# Cables without a largest tension get a limit of so many times the largest tension that the wrench needs.
 CAP = 1e3
 
 

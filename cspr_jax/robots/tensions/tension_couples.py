@@ -31,7 +31,7 @@ def tension_couples(
     """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
 
     A couple is the force of two cables whose spools are the ends of a side, as seen along that side, where both lie in
-    one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples share the force.
+    one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples make up the force.
     """
     spools = robot.base_points
     force = robot.mass * relative_acceleration(robot, acceleration)

@@ -4,8 +4,8 @@ All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an
 wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
 (d + 1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0,
 and the points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again
-and again, as in the improved closed form of Pott (2013); a limit that then holds a tension back is let go again
-(Goldfarb and Idnani 1983), which makes the answer exact, and proves that there is none where there is none.
+and again, as in the improved closed form of Pott (2013). Here a fixed limit is released if its multiplier becomes
+negative (Goldfarb and Idnani 1983), so that the answer is exact: if none is found, none exists.
 
 The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
 """
@@ -27,9 +27,8 @@ from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
 
-# A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
-# the second.
-WITHIN, TENSION_ERROR = TOUCHED, 1e-11
+WITHIN = TOUCHED  # over the largest tension, by which a limit may be broken and counts as kept
+TENSION_ERROR = 1e-11  # the same where candidates for the answer are compared
 # A unit vector depends on others if its component normal to them is shorter than this.
 DEPENDENT = 1e-10
 # Largest number of steps of the search for the limits that are reached, over the number of cables; random cases take
@@ -135,9 +134,9 @@ def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof
 
 
 def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
-    """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths at first.
+    """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths before scaling.
 
-    By Gram and Schmidt, the longest vector first: the rows of W, then unit vectors, whose products mean nothing.
+    By Gram and Schmidt, the longest vector first: the rows of W, then unit vectors, whose products have no meaning.
     """
     dof, count = matrix.shape
     is_row = np.arange(dof + count) < dof
@@ -238,7 +237,7 @@ def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
 
 
 def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
-    """Step towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
+    """Step towards the limit that is sought, until it is reached or a fixed limit must be released."""
     excess = beyond(solutions.tensions(search.point), low, high)
     sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
     is_sought = jnp.arange(excess.size) == sought
@@ -292,7 +291,7 @@ def projected(
 
 
 def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
-    """Largest r, () N: half of a cable's range, or a face's slack over its rate for each newton of r."""
+    """Largest r, () N: the smallest of half the range of each cable, and of each face's slack over its loss per r."""
     dof, count = matrix.shape
     if count == dof:
         return jnp.min(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))

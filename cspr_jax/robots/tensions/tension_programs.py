@@ -6,7 +6,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 
-# A residual may be off by this part of the right-hand side.
+# Error of a residual over the right-hand side.
 CLOSE = 1e-6
 
 

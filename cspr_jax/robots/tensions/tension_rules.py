@@ -36,18 +36,18 @@ from cspr_jax.robots.tensions.tension_distribution import (
 from cspr_jax.robots.tensions.tension_distribution_lanes import FREE, least_norms
 
 BATCH = 4096
-# The p-norm takes so many steps of Newton's method, while the weight of the limits decreases from first to last, which
-# serves the last steps.
+# Steps of Newton's method for the p-norm: the weight of the limits decreases from the first value to the last one, with
+# which the last steps are made.
 STEPS = 60
 LAST_STEPS = 12
 FIRST_WEIGHT = 1e-1
 LAST_WEIGHT = 1e-14
 LENGTHS = 24  # of each step, which are compared
 LONGEST_STEP = 0.99  # over the distance to the nearest limit
-# Tensions nearer to the reference than this part of the largest distance count as being at this distance: nearer, a
+# Distances of tensions from the reference below this fraction of the largest one are raised to it: at a distance of 0 a
 # second derivative would be infinite.
 NEAR = 1e-9
-# For cables without a largest tension the search may begin at this multiple of the largest tension in sight.
+# For cables without a largest tension the search may begin at this multiple of the largest tension of the least norm.
 FAR = 10.0
 EXPONENT = 4.0
 MIN_EXPONENT = 1.01

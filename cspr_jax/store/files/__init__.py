@@ -1,1 +1,1 @@
-"""Files on a disk: whole or not at all, with checksums, in netCDF-4 layout."""
+"""Files on a disk: complete or absent, with checksums, in netCDF-4 layout."""

@@ -84,7 +84,7 @@ def read_regular(path: Path, maximum: int, *, last: bool = False) -> bytes:
 
 
 def has_trailer(path: Path, file: int) -> bool:
-    """Tell whether an open file ends with a checksum trailer; files of others need not be read whole."""
+    """Tell whether an open file ends with a checksum trailer; files of others need not be read completely."""
     try:
         line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
     except OSError as error:

@@ -15,8 +15,8 @@ from h5py import h5a, h5d, h5g, h5l, h5o, h5s, h5t, h5z
 
 from cspr_jax.store.files.checksum import DamagedError
 
-# A map has at most so many tiles, each a chunk; bytes of one.
-LARGEST_CHUNKS, LARGEST_CHUNK = 100_000, 1 << 24
+LARGEST_CHUNKS = 100_000  # a map has at most so many tiles, each of which is a chunk
+LARGEST_CHUNK = 1 << 24  # bytes
 # Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16

@@ -26,7 +26,7 @@ UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError
 
 @contextlib.contextmanager
 def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """An HDF5 file that appears under its name only when it is whole."""
+    """An HDF5 file that appears under its name only when it is complete."""
     disk = Disk()
     with new_file(disk, path) as descriptor, open_hdf5(disk, descriptor, attributes) as file:
         yield file

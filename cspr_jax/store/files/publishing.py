@@ -1,6 +1,6 @@
-"""Files and folders that are there whole or not at all.
+"""Files and folders that are complete or absent.
 
-A file gets its name only when it is whole and on the disk: written under another name in the same
+A file gets its name only when it is complete and on the disk: written under another name in the same
 folder, flushed, renamed, and the folder flushed. A crash leaves the old state or the new one.
 """
 
@@ -14,29 +14,29 @@ from pathlib import Path
 from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.files.disk import USUAL, Disk, write_all
 
-# Endings of unfinished files: of this version, and of earlier ones, which named their process.
 LONGEST_NAME = 255  # bytes, of whatever disk
+# Endings of unfinished files: of this version, and of earlier ones, which named their process.
 PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 
 
 def part_of(path: Path) -> Path:
-    """Name under which a file is written until it is whole; nobody can know it beforehand."""
+    """Name under which a file is written until it is complete; nobody can guess it."""
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
 def check_writable(path: Path | None) -> None:
-    """Refuse a file that cannot be written where it is to be, before the work of which it is the end."""
+    """Refuse a file that cannot be written where it is to be, before the long work that it is for."""
     if path is None:
         return
     is_long = len(os.fsencode(part_of(path).name)) > LONGEST_NAME
-    faults: tuple[tuple[int, Callable[[], bool]], ...] = (
+    reasons: tuple[tuple[int, Callable[[], bool]], ...] = (
         (errno.ENAMETOOLONG, lambda: is_long),
         (errno.EISDIR, path.is_dir),
         (errno.ENOENT, lambda: not path.parent.exists()),
         (errno.ENOTDIR, lambda: not path.parent.is_dir()),
         (errno.EACCES, lambda: not os.access(path.parent, os.W_OK | os.X_OK)),
     )
-    number = next((number for number, is_so in faults if is_so()), None)
+    number = next((number for number, is_so in reasons if is_so()), None)
     if number is not None:
         raise refusal(path, OSError(number, os.strerror(number)))
 
@@ -64,7 +64,7 @@ def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
 
 
 def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
-    """Write a small file whole or not at all."""
+    """Write a small file completely or not at all."""
     with new_file(disk, path, mode=mode) as file:
         write_all(disk, file, data)
 

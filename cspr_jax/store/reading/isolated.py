@@ -155,7 +155,7 @@ class Reader:
             raise self._ended(path) from error
         except DamagedError:
             if trailer is not None:
-                check_open(path, file)  # a disk that fails now is no fault of the file
+                check_open(path, file)  # a disk that fails now does not mean that the file is damaged
             raise
         self._idle = True
 

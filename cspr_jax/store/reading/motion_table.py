@@ -18,8 +18,8 @@ from cspr_jax.store.files.netcdf import file_size
 # Both are sizes of text; numbers take a third of it in memory. The header has some hundred names.
 LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
 FEASIBLE = "feasible"
-# Rows whose work is examined; part of the work that lifting must explain for its sign to say where z points.
-WORK_ROWS, EXPLAINED = 4096, 0.5
+WORK_ROWS = 4096  # rows whose work is examined
+EXPLAINED = 0.5  # fraction of the work that lifting must explain for its sign to say where z points
 
 
 def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -34,7 +34,7 @@ from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError
 from cspr_jax.store.files.netcdf import UNREADABLE, reason
 from cspr_jax.store.shards import Layout, decode, header_of
 
-# A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
+# A result is read into memory completely. A byte of a file holds a few bytes of data, or many if these are all equal.
 LARGEST_DATA, DENSEST = 8e9, 50
 # Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
 _INSPECTION_SECONDS, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
@@ -103,7 +103,7 @@ def _exactly(channel: socket.socket, count: int) -> bytes:
 
 
 def _check_netcdf(path: Path) -> None:
-    # Another program's files have no trailer; one of this program that is not whole has none either.
+    # Another program's files have no trailer; neither has an incomplete file of this program.
     with contextlib.suppress(*UNREADABLE), h5py.File(path, "r") as file:
         if h5a.exists(file.id, _OF_NETCDF):
             return
@@ -207,7 +207,7 @@ def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
 
 
 def _grant(seconds: float, memory: int) -> None:
-    # Time of the processor, not of the clock: a busy machine is no fault of the file.
+    # Time of the processor, not of the clock, so that a busy machine does not make a file unreadable.
     used = resource.getrusage(resource.RUSAGE_SELF)
     _limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime + seconds))
     try:
@@ -218,7 +218,7 @@ def _grant(seconds: float, memory: int) -> None:
 
 
 class _Limits:
-    # The flag is set where somebody else's limits are narrower: a failure at them is no fault of the file.
+    # The flag says that narrower limits of somebody else hold: a failure at these says nothing of the file.
     are_foreign = False
 
 

@@ -39,7 +39,7 @@ def time_bounds(
     tau = normalised(duration, start, end)
     knots = np.concatenate([[0.0], np.asarray(amplitude.knots, float), [1.0]])
     pieces, errors = _pieces(amplitude, knots, orders)
-    # Bounds hold for the block that is as much longer as the normalised time is uncertain.
+    # Bounds hold for a block that is longer by the uncertainty of the normalised time.
     first, last = tau.middle - tau.linear, tau.middle + tau.linear
     bounds = piecewise_bounds(pieces, overlaps(knots, first, last), orders)
     slack = [error + np.asarray(amplitude.largest)[order + 1] * ROUNDING for order, error in enumerate(errors)]
@@ -51,7 +51,7 @@ def time_bounds(
 
 
 def _pieces(amplitude: Amplitude, knots: np.ndarray, orders: int) -> tuple[np.ndarray, list[float]]:
-    # Return Bernstein coefficients (n_pieces, degree + 1, 1), and what rounding may be of each order, in all pieces.
+    # Return Bernstein coefficients (n_pieces, degree + 1, 1), and bounds of their rounding errors for each derivative.
     powers, origins = np.asarray(amplitude.coefficients, float), np.asarray(amplitude.origins, float)
     degree = int(np.flatnonzero(powers.any(0)).max(initial=0))
     powers, radii = powers[:, : degree + 1], np.abs(np.stack([knots[:-1], knots[1:]]) - origins).max(0)

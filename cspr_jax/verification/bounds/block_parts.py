@@ -1,8 +1,8 @@
 """Blocks of some motions with bounds of their slacks, and the parts into which they are cut.
 
-Over a block a slack lies between two lines. Each leaves what it decides: the part in which the lower line is above a
-level, or the upper one below it, is decided. Where the rest is a small part of the block, the block is cut
-there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
+Over a block a slack lies between two lines. The part in which the lower line is above a level, or the upper one below
+it, is decided. Where the rest is a small fraction of the block, the block is cut there; at a simple root the rest
+shrinks with the square of its length, while halving would take a step for each binary digit.
 """
 
 from __future__ import annotations
@@ -15,16 +15,15 @@ from cspr_jax.numerics.shapes import Bool, Complex, Float
 from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 
-# A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
-SMALL = 0.5
-WIDER = 1e-3
+SMALL = 0.5  # of a block: a rest below this fraction is cut out, else the block is halved
+WIDER = 1e-3  # of a block, by which a rest is widened at either end
 
 
 class TimeBlocks(NamedTuple):
     """Blocks of time.
 
     Fields:
-        motion: (k,) number of the motion, from 0 on.
+        motion: (k,) index of the motion.
         start: (k,) s.
         end: (k,) s.
         slacks: bounds, (k, n_criteria).
@@ -47,7 +46,7 @@ class TimeBlocks(NamedTuple):
     def rest(
         self, level: np.ndarray, matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Part of each block outside of which no lower line is below a level, or the upper one is below it."""
+        """Undecided part of each block: elsewhere each lower line is above a level, or the upper one below it."""
         low, high, low_rise, high_rise = self.slacks
         sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
         if has_upper:
@@ -60,13 +59,13 @@ class TimeBlocks(NamedTuple):
     def cut(
         self, first: Float[np.ndarray, "k"], last: Float[np.ndarray, "k"], jumps: Complex[np.ndarray, "n"]
     ) -> "tuple[TimeBlocks, TimeBlocks]":
-        """Cut each block before and after its rest, or in two; where accelerations jump within a block, there."""
+        """Cut each block before and after its undecided part, or in two: at a jump of the acceleration, if any."""
         width = self.end - self.start
         before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
         is_cut = (last - first < SMALL) & (before < after)
         outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
         outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
-        # No bounds of a block across a jump come close to what is on both of its sides.
+        # Bounds of a block with a jump inside would be wide on both sides of it.
         start, end = np.where(is_cut, before, self.start), np.where(is_cut, after, self.end)
         middle, has_jump = _jump_within(jumps, self.motion, start, end)
         middle = np.where(has_jump, middle, 0.5 * (start + end))
@@ -76,7 +75,7 @@ class TimeBlocks(NamedTuple):
         return joined(outside), joined([inner.take(~is_split), *halves])
 
     def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
-        # Bounds by the lines between two fractions of the block, beyond the edges by more than these are rounded.
+        # Bounds by the lines between two fractions of the block, which are extended by more than their rounding errors.
         low, high, low_rise, high_rise = self.slacks
         ends = [np.broadcast_to(fraction, len(low))[:, None] for fraction in (first, last)]
         lower = np.minimum(*(low_rise * fraction for fraction in ends)) + np.maximum(-low_rise, 0.0)

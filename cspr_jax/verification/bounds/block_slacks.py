@@ -33,14 +33,14 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.criteria import AT_INSTANTS, contact_criteria, criteria, judged_poses
+from cspr_jax.verification.criteria import AT_TIMES, contact_criteria, criteria, pose_conditions
 
 # Blocks that are bounded together, with contacts and without.
 BATCH = 64
 RATES_BATCH = 128
-# Length of a block and the one before it, together, at which what happens at one time counts for the block, s.
+# An event at a single time counts if the block and the one before it are together no longer than this, s.
 SHORTEST = 1e-6
-# Upper bound of a slack that vanishes at one time.
+# Upper bound of a slack, with its sign turned, where it is proved to vanish at a single time.
 SMALLEST = 1e-12
 Pair = tuple[Array, Array] | Array
 # Bounds of slacks, without lines or with them, in the order of the fields of `BlockSlacks`.
@@ -156,9 +156,9 @@ def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench
 
 
 def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[Part]:
-    # Bound the determinant and the depth below the spools, where they are judged.
+    # Bound the determinant and the depth below the spools, where they are criteria.
     parts: list[Part] = []
-    is_regular, is_below = judged_poses(robot)
+    is_regular, is_below = pose_conditions(robot)
     if is_regular:
         low, high = magnitude_range(determinant(matrix))
         parts.append((low[None] - SINGULAR, high[None] - SINGULAR))
@@ -169,7 +169,7 @@ def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[
 
 def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateBounds, cables: CableBounds) -> Array:
     # Tell which of the determinant and the contacts are proved to vanish within a block, (1 + n_contacts,).
-    is_regular, _ = judged_poses(robot)
+    is_regular, _ = pose_conditions(robot)
     through = changes_sign(determinant(matrix)) if is_regular else jnp.zeros((), bool)
     return jnp.concatenate([through[None], passings(robot, bodies, state, cables)])
 
@@ -218,8 +218,8 @@ def block_slacks(
     slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
     low, high, *rises = in_batches(slacks, bounds(start, end), batch_size=BATCH)
     rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
-    at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
-    is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
+    at_times = np.array([row.flag in AT_TIMES for row in rows])
+    is_open = ~((low > 0.0) | (high < 0.0))[:, at_times]
     # An event at the border of two blocks is within the second one and the end of the first.
     before = np.maximum(2.0 * start - end, 0.0)
     short = np.flatnonzero(is_open.any(1) & (end - before <= SHORTEST))
@@ -228,9 +228,9 @@ def block_slacks(
         # Bounds are of all blocks together, which may be those of several motions.
         states = jax.tree.map(lambda array: np.asarray(array)[short], bounds(before, end))
         passes = in_batches(kernel, states, batch_size=BATCH)
-        passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
+        passes = passes if rows[np.argmax(at_times)].flag == Verdict.SINGULAR else passes[:, 1:]
         vanishing = np.zeros((len(short), len(rows)), bool)
-        vanishing[:, at_instants] = passes & is_open[short]
+        vanishing[:, at_times] = passes & is_open[short]
         high[short] = np.where(vanishing, -SMALLEST, high[short])
         rises[1][short] = np.where(vanishing, 0.0, rises[1][short])
     return BlockSlacks(low, high, *rises)

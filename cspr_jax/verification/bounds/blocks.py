@@ -11,7 +11,7 @@ import numpy as np
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.shapes import Float, Num
 
-# A remainder of up to this part of a block does not add a block to a piece between knots.
+# A remainder of a piece between knots that is shorter than this fraction of a block adds no further block.
 SLIVER = 0.3
 SAMPLES = 1025  # at which the number of parts of an arc is tabulated
 
@@ -20,7 +20,7 @@ class Blocks(NamedTuple):
     """Blocks of motions.
 
     Fields:
-        row: (k,) number of the motion that the block belongs to.
+        row: (k,) index of the motion that the block belongs to.
         start: (k,) tau where it starts.
         stop: (k,) tau where it stops; no knot inside.
     """
@@ -79,7 +79,7 @@ def parts_of_arcs(arcs: Num[np.ndarray, "n"], knots: Float[np.ndarray, "n_knots"
     numbers, group = np.unique(arcs, return_inverse=True)
     edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
     lengths = np.array([len(x) for x in edges], int)
-    # All edges lie in one row. Find where those of each motion begin in it, and the edge at which each block starts.
+    # All edges are in one array. Find where those of each motion begin in it, and the edge at which each block starts.
     begins, counts = (np.cumsum(lengths) - lengths)[group], (lengths - 1)[group]
     row = np.repeat(np.arange(len(arcs)), counts)
     first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)

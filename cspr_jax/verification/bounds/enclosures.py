@@ -21,10 +21,10 @@ class Distances(NamedTuple):
         change: (k, m) by how much the distances can shrink within the block.
         tilt: (k, m) gain of the bounds, per displacement of the spools, along vectors tilted against it.
         sine: (k, m) sine of the angle of that tilt per displacement, 1/m; the bounds shrink by its cosine.
-        swing: (k, m) what the tilted bounds can lose besides within the block, per displacement.
+        swing: (k, m) what the tilted bounds can lose within the block beside `change`, per displacement.
         spools: (m,) largest loss of each distance, per largest displacement of a spool.
-        current: (k, l) distances in the middle.
-        current_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
+        middle: (k, l) distances in the middle.
+        middle_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
     """
 
     bound: np.ndarray
@@ -33,8 +33,8 @@ class Distances(NamedTuple):
     sine: np.ndarray
     swing: np.ndarray
     spools: np.ndarray
-    current: np.ndarray
-    current_spools: np.ndarray
+    middle: np.ndarray
+    middle_spools: np.ndarray
 
     def hold(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
         """Tell whether all distances stay positive within blocks, however spools move: proved."""
@@ -45,7 +45,7 @@ class Distances(NamedTuple):
 
     def fail(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
         """Tell whether the worst displacements of the spools use up a distance in the middle of each block."""
-        return (self.current < self.current_spools * spools[:, None]).any(1)
+        return (self.middle < self.middle_spools * spools[:, None]).any(1)
 
 
 class Rates(NamedTuple):
@@ -74,7 +74,7 @@ class Enclosure(NamedTuple):
         moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
         acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative
             acceleration, 1/s^2.
-        tangent: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
+        tangent: (k, n_cables, 3) change of the tangents of the rays from the middle to the end of the block, m.
         deviation: (k, n_cables) largest distance of the rays from their tangents within the block, m.
         force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
         acceleration_matrix_change: (k,) largest such change of `acceleration_matrix`, 1/s^2.

@@ -43,8 +43,8 @@ def swing_bounds(
             (r2 + r * steady) * sine * nu,
         )
     # Into the axes of the robot.
-    current, velocity, acceleration = (
+    position, velocity, acceleration = (
         rotated(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
         for x, y in (local_position, local_velocity, second_derivative)
     )
-    return current + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)
+    return position + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)

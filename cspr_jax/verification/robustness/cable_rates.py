@@ -44,7 +44,7 @@ def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Bound the component of vectors along all rays that lie within a part `ball` of their length of the given rays.
+    # Bound the component of vectors along all rays within balls around the given ones, of `ball` times their length.
     component, norm = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
     across = np.sqrt(np.maximum(norm**2 - component**2, 0.0))
     angle, inclination = np.arcsin(ball), np.arctan2(across, component)

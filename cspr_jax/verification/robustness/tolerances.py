@@ -24,14 +24,14 @@ from cspr_jax.verification.robustness.uncertainty import Requirements, WorstDisp
 FIRST_MULTIPLES = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
 RATIO = 8.0
 SMALLEST = 1e-6
-NEAR = 0.99  # ratio that the proved and the refuted multiple are to reach
-STEPS = 12  # bisections that find each
+NEAR = 0.99  # ratio of the proved to the refuted multiple at which the search ends
+STEPS = 12  # bisections for each of the two
 HALVINGS = 14  # of a block, at most
 OPEN = 256  # blocks of an arc, at most
-# Times as many blocks as usual may be open where it is decided whether a motion is feasible: at the multiple 1.
+# Factor of `OPEN` at the multiple 1, which decides whether a motion is feasible.
 DECIDED = 4.0
-LOWERED = 0.95  # factor of a target where more blocks are open
-LOWERINGS = 8  # how often it is applied in a row
+LOWERED = 0.95  # factor by which a target is lowered if more blocks are open
+LOWERINGS = 8  # largest number of times in a row that it is
 # Levels of halving at which a robot that fails is looked for although the bounds cannot hold.
 MORE = 3
 
@@ -158,7 +158,7 @@ class _MultipleSearch:
 
     @property
     def _most_open(self) -> np.ndarray:
-        # Multiples other than 1 need not be so close: they decide nothing.
+        # Multiples other than 1 need not be as close: no verdict depends on them.
         return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
 
     def left(self, pool: Pool) -> Pool:
@@ -229,7 +229,7 @@ def _enclosed(requirements: Requirements, enclose: Callable[[Blocks], Enclosure]
 
 
 def _targets(refuted: np.ndarray, *, full: bool) -> np.ndarray:
-    # Return the multiples that are to be proved; 0 where there is nothing to be proved any more.
+    # Return the multiples that are to be proved; 0 where the search has ended.
     if not full:
         return np.where(refuted > 1.0, 1.0, 0.0)
     return np.minimum(_near(refuted), LARGEST_MULTIPLE)

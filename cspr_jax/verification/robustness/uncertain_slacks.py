@@ -3,7 +3,7 @@
 Spools and the mass centre lie in balls around their positions. What is proved rests on the tensions of
 `robots.bounds.uncertain_tensions`, for the smallest and the largest mass: sums of the tensions of both, in proportion,
 serve all masses between. Lengths change by no more than spools do; unit vectors of cables stay in cones, which bounds
-rates, accelerations and clearances. Determinant and depth are judged for the planned robot alone.
+rates, accelerations and clearances. Determinant and depth are checked for the planned robot alone.
 
 What is refuted rests on the slacks of single robots in single states, displaced along differences of these slacks.
 """

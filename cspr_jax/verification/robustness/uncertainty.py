@@ -27,7 +27,7 @@ from cspr_jax.robots.model.limits import Limits, Uncertainty
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, inverted, structure
 from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
 
-# Blocks without an enclosure have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
+# Blocks without an enclosure have infinite bounds and no inverse. They become NaN, which neither proves nor refutes.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # Largest relative error of solving for a deviation, and of the tensions.
 SOLVING_ERROR = 1e-9
@@ -78,8 +78,9 @@ def _radii(requirements: Requirements, multiple: np.ndarray) -> _Radii:
 
 
 class _Effects(NamedTuple):
-    # Effects in k blocks of a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
-    # planned lengths; motion of rays from the middle, over their lengths; effect of the mass centre on tensions.
+    # Effects of a multiple of the uncertainty in k blocks, (k, n_cables) each: `off`, displacement of spools across
+    # rays, at planned lengths; `tilt`, motion of rays from the middle, over their lengths; `centre`, effect of the mass
+    # centre on tensions.
     off: np.ndarray
     tilt: np.ndarray
     centre: np.ndarray
@@ -88,7 +89,7 @@ class _Effects(NamedTuple):
 def _effects(enclosure: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Effects:
     near = influence.lengths - enclosure.moved
     fraction = spools[:, None] / np.where(near > 0.0, near, np.nan)
-    # A displaced spool counts as one that is displaced across its ray alone, at the planned length.
+    # A displacement of a spool is replaced by one across its ray alone that has the same effect at the planned length.
     off = np.where(fraction < 1.0, spools[:, None] / np.sqrt(1.0 - fraction**2), np.nan)
     direct_effect, moment, force = (
         np.linalg.norm(x, axis=2) for x in (influence.centre, influence.moments, influence.forces)
@@ -136,7 +137,7 @@ class Changes(NamedTuple):
     """Largest changes of tensions, per mass and length.
 
     Fields:
-        down: (k, n_cables) 1/s^2; infinite where nothing is enclosure.
+        down: (k, n_cables) 1/s^2; infinite where nothing is known.
         up: (k, n_cables) likewise.
     """
 
@@ -179,7 +180,7 @@ def _largest_sum(enclosure: Enclosure, influence: Influence, weights: np.ndarray
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
         moved, shifted = _changes(enclosure, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + SOLVING_ERROR * np.max(weights, axis=2, keepdims=True), more
-    # The last correction is enough for the functional of the round before; it must be enough for its own.
+    # The last correction was computed for the functional of the round before; test that it holds for its own.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
     moved, shifted = _changes(enclosure, influence, functional, far)
     total = np.sum((weights + last) * (enclosure.high + far.centre)[:, None] + moved * enclosure.high[:, None], axis=2)

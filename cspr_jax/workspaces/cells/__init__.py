@@ -2,7 +2,7 @@
 
 Files, each importing only from those above it:
 
-    worst_facet_normals   the cocircuit that decides at a pose
+    worst_facet_normals   the facet normal that decides at a pose
     shifts                how far cables move within a cell
     cells                 boxes of positions, and bounds over them
     inside_cells          cells in which tensions stay within limits at every position

@@ -23,9 +23,9 @@ from cspr_jax.workspaces.cells.worst_facet_normals import worst_facets
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
-PART, BATCH = 256, 1024
-# Tensions at the centre keep this part of the margin from their limits. At the whole margin only one point is left,
+PART = 256  # cells that are proved at a time, so that their arrays fit a cache
+BATCH = 1024  # poses whose facet normals are compared at a time
+# Tensions at the centre keep this fraction of the margin from their limits. At the full margin only one point is left,
 # which rounding can miss.
 KEPT = 0.98
 # Rounds in which displacements of spools are sought with which a wrench is out of reach.
@@ -35,7 +35,7 @@ ROUNDS = 2
 class CellProofs:
     """Proofs of cells at one orientation, without halving.
 
-    What is inside is so for all robots whose spools are within a distance of their places; what is outside, for one.
+    Inside holds for all robots whose spools are within a distance of their positions, outside for one of them.
     """
 
     def __init__(self, search: WorkspaceSearch, quaternion: np.ndarray, spools: float = 0.0) -> None:
@@ -45,7 +45,7 @@ class CellProofs:
         self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
         self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
         self._arms, self._forces = cable_wrenches(robot, quaternion, search.unit)
-        # The required wrenches are the same at every place, for the robot does not turn.
+        # The required wrenches are the same at every position, since the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
         self._wrenches, self._enclosing = required.corners, required.enclosing.corners
         self._spreads = np.reshape(required.ellipsoids, (-1, robot.dof))
@@ -129,9 +129,9 @@ class CellProofs:
     def _displacements(
         self, positions: np.ndarray, exits: np.ndarray, normals: np.ndarray, held: np.ndarray, loads: np.ndarray
     ) -> np.ndarray:
-        # Displacements of spools, (n, n_cables, 3) m, by which, to first order, tensions give the least along normals.
-        # Cables to which these are normal have the tensions with which the others, each at its limit, come nearest to
-        # the wrench.
+        # Displacements of spools, (n, n_cables, 3) m, with which, to first order, tensions supply least along normals.
+        # Cables along a normal are at their limits; the cables that it is normal to have the tensions that then come
+        # nearest to the wrench.
         matrices, units = self._matrices(positions, exits), unit_vectors(exits - positions[:, None])
         effects = np.einsum("nm,kmi->nik", normals, self._forces)
         products = (effects * units).sum(2)

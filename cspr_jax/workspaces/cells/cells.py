@@ -40,7 +40,7 @@ class Cells(NamedTuple):
         lengths: (n, n_cables) L_i at the centres, m.
         radius: (n,) from centre to corner, m.
         rounding: (n, n_cables) bound of the rounding of a column of Z, m.
-        moves: (n, n_cables) how far exits may be from their places at the centres, m.
+        moves: (n, n_cables) how far exits may be from their positions at the centres, m.
         wrenches: (n, 3, m, n_cables) A_i.
     """
 
@@ -114,7 +114,7 @@ def pair_norm(vectors: Float[np.ndarray, "n 3 3 m"]) -> Float[np.ndarray, "n"]:
 
 
 def inverse_factor(squares: Float[np.ndarray, "n m m"]) -> Float[np.ndarray, "n m m"]:
-    """Inverse of the lower Cholesky factor of symmetric matrices; no error where one is not positive definite."""
+    """Inverse of the lower Cholesky factor of symmetric matrices; nothing is raised if one is not positive definite."""
     n = squares.shape[1]
     left = np.ascontiguousarray(squares.transpose(1, 2, 0))
     inverse = np.zeros_like(left)

@@ -1,12 +1,12 @@
 """Bounds of clearances over cells: of cables from each other, from obstacles and from their platform.
 
-While a robot moves within a cell without turning, every point of its bodies is affine in x, |x_k| <= 1, but for exits
-of pulleys, which stay within balls, and for the ends of what is left out of cables next to a platform, whose terms of
-second order are bounded. As over blocks of time (`robots.contacts.convex_gaps`), two convex bodies are apart by as much
-as the least component of the vectors between their corners along a direction, whichever it is. The direction is that of
-the nearest points at the centre, and turns with x as they do there, n(x) = n + sum_k x_k n_k, so that the components
-are quadratic in x and the bounds lose terms of second order alone. From above the distance is that of two fixed points
-of the bodies, which is largest at a corner of the cell.
+While a robot moves within a cell without turning, every point of its bodies is affine in x, |x_k| <= 1, except exits
+of pulleys, which stay within balls, and the ends of the parts of cables that are left out next to a platform, whose
+terms of second order are bounded. As over blocks of time (`robots.contacts.convex_gaps`), the distance of two convex
+bodies is at least the smallest component, along any direction, of the vectors between their corners. The direction is
+that of the nearest points at the centre, and turns with x as they do there, n(x) = n + sum_k x_k n_k, so that the
+components are quadratic in x and the bounds lose terms of second order alone. From above the distance is that of two
+fixed points of the bodies, which is largest at a corner of the cell.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.workspaces.cells.cells import smallest_quadratic
 
 BATCH = 512
-# Over the largest coordinate: far above the rounding of bounds, far below what anybody measures.
+# Error of distances over the largest coordinate: far above the rounding of bounds, far below measurable distances.
 DISTANCE_ERROR = 1e-12
 # The second derivative of r / |r| is no longer than this over |r|^2; half of it counts.
 UNIT_CURVATURE = 0.5 * np.sqrt(4.0 / 3.0)
@@ -233,6 +233,6 @@ def _from_platform(bodies: Bodies, shape: Shape, cell: _CellLanes) -> Range:
         return low, jnp.minimum(high, _depth(Solid(cable, *SEGMENT), shape.planes))
 
     low, high = jax.vmap(one)(ends)
-    # A cable that may be as short as the part that is left out is not judged.
+    # A cable that may be as short as the part that is left out is not checked.
     is_long = shortest > bodies.leave
     return jnp.where(is_long, low, -jnp.inf) - bodies.radii, jnp.where(is_long, high, jnp.inf) - bodies.radii

@@ -1,4 +1,4 @@
-"""Cells in which no tensions within limits suffice at any position, from the worst cocircuit at the centre; no jax.
+"""Cells in which no tensions within limits suffice at any position, from the worst facet normal at the centre; no jax.
 
 Let c be normal to dof - 1 columns S of Z, and move with them: c(x) . Z_S(x) = 0. These cables do nothing along c,
 whatever their tensions, and the wrench is out of reach at x where
@@ -16,8 +16,8 @@ e the last unit vector, so that with z_j = Q^T Z_j0 and its change a_j = sum_k x
     |rest_j| <= |e^T K| |K| |v_j| / (1 - |K|).
 
 Inverse lengths are L0 / L = 1 + u . dp / L0 + rest, |rest| <= |dp|^2 L0 / (L0 - |dp|)^3, since the second derivatives
-of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, so that Q^T Q is not quite I. A normal that does not
-move, K = 0, will do where all cables keep away from being normal to it; then the products are affine.
+of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, so that Q^T Q is not quite I. Where no cable comes near
+to being normal to c, a fixed c does as well (K = 0); then the products are affine.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def are_beyond(
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
         minimum, maximum = (side[:, :-1] for side in products.ends)
-        # For each other cable one limit counts at the centre; where the other limit counts, it costs something.
+        # The sign at the centre says which limit of each other cable counts; where the sign changes, the slack is less.
         is_positive = products.value[:, :-1] > 0.0
         is_bounded = np.isfinite(high)
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
@@ -175,9 +175,9 @@ def lower_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n 
     deviation = quadratic + linear[..., :, None] * steps[..., None, :]
     quadratic_terms = products.quadratic[:, -1] - (limits[..., None, None] * deviation).sum(1)
     shift, radius = largest_linear(steps), cells.radius[:, None]
-    regularization = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
+    inverse_rest = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
     cable_rests = products.rest[:, :-1]
     maximum = np.abs(value) + largest_linear(linear) + second + cable_rests
-    rest = cable_rests * (1.0 + shift) + second * shift + maximum * regularization
+    rest = cable_rests * (1.0 + shift) + second * shift + maximum * inverse_rest
     rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
     return middle - largest_linear(along) + smallest_quadratic(quadratic_terms) - rest

@@ -76,7 +76,7 @@ def proved_sides(
     inner = positions[left, None] + corners * half[left, None]
     part_sides = conditions.at(inner.reshape(-1, 3)).reshape(inner.shape[:2])
     result.mixed[left] = (part_sides == -sides[left, None]).any(1)
-    # Only cells whose parts all have their centres on the same side can be proved.
+    # A cell can be proved only if the centres of all its parts are on the same side.
     agreeing = (part_sides == sides[left, None]).all(1)
     if agreeing.any():
         halved, count = left[agreeing], len(corners)

@@ -1,4 +1,4 @@
-"""The cocircuit that decides at a pose: the normal to some cables along which the others do the least."""
+"""The facet normal that decides at a pose: normal to some cables, with the smallest slack along it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from jax import Array
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import normals_to, spanning
 
-# Components of a cocircuit below this part of the largest one do not make it void.
+# Products of a facet normal with cables count as zero below this fraction of the largest one.
 ZERO = 1e-9
 # A normal to dof - 1 unit columns means nothing if its products with all other columns are smaller than this.
 SHORT = 1e-9
 
 
 class WorstFacets(NamedTuple):
-    """Cocircuits, one a pose.
+    """Facet normals, one for each pose.
 
     Fields:
         normal: (n, dof) c.
         subset: (n,) row of `wrench_sets.spanning`: the cables that it is normal to.
-        load: (n,) number of the wrench that needs the most along it.
+        load: (n,) index of the wrench that needs the most along it.
         inner: (n, dof) sum of all normals along which the same wrench is out of reach, weighted by how far. Since the
             most that tensions give along c is a convex function of c, the wrench is out of reach along the sum too, and
             no cable is normal to it.
@@ -49,10 +49,10 @@ def worst_facets(
     condition: str,
     unbounded: Sequence[bool],
 ) -> WorstFacets:
-    """Cocircuits with the least slack, times the volume of the columns that they are normal to.
+    """Facet normals with the least slack, times the volume of the columns that they are normal to.
 
-    This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
-    single cocircuit is violated, it is that one; where none is, it is the one whose plane is the nearest.
+    This weight puts normals to nearly dependent columns last, which turn fast with the position. Where a single facet
+    is violated, it is that one; where none is, it is the nearest one.
     """
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)

@@ -3,8 +3,8 @@
 Files, each importing only from those above it:
 
     geometry        unit vectors and wrench matrices of many poses
-    facet_normals   cocircuits that a robot has
-    margins         margins, cocircuit by cocircuit, between two bounds
+    facet_normals   facet normals that a robot has
+    margins         margins, one facet normal after the other, between two bounds
     exact           margins of single poses by singular values
     kernels         compiled margins of many poses
 """

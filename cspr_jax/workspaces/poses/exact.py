@@ -11,19 +11,18 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.poses.facet_normals import CableSubsets
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 
-# Singular values count as zero below the first of these parts of the largest one, or below the second number, since
-# columns are unit vectors.
-RANK, NOTHING = 1e-9, 1e-13
-# Components of a cocircuit below this part of the largest one count as zero.
+RANK = 1e-9  # singular values over the largest one that count as zero
+NOTHING = 1e-13  # singular values that count as zero: columns are unit vectors
+# Products of a facet normal with cables count as zero below this fraction of the largest one.
 ZERO = 1e-10
-# A wrench may lie outside of the span of the cables by this part of its length.
+# A wrench lies in the span of the cables if its distance from the span is below this fraction of its length.
 OUTSIDE = 1e-9
 
 
 def facet_normals(
     matrix: Float[np.ndarray, "dof n_cables"],
 ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k dof"], Float[np.ndarray, "dof rank"]]:
-    """Cocircuits of a wrench matrix, and a basis of its span."""
+    """Facet normals of a wrench matrix, by their products with the cables, and a basis of its span."""
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
     rows = right[:rank]
@@ -59,7 +58,7 @@ class Planes(NamedTuple):
 def margin_planes(
     matrix: Float[np.ndarray, "dof n_cables"], low: Float[np.ndarray, "n_cables"], high: Float[np.ndarray, "n_cables"]
 ) -> Planes:
-    """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign."""
+    """Planes that bound the margin by their distances, in newtons of tension: one for each facet normal and sign."""
     components, normals, basis = facet_normals(matrix)
     rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)

@@ -1,13 +1,13 @@
-"""Cocircuits of a wrench matrix: the vectors of its row space with the fewest components that are not zero.
+"""Facet normals of a wrench matrix W, given by their products with the cables.
 
-They decide what cables can do. Tensions at a distance s from all limits give a wrench w, W t = w, if and only if for
-each cocircuit y and any tensions t0 with W t0 = w the product y . t0 keeps a distance, which grows with s, from the
-bounds that the limits set (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010). Every
-wrench can be resisted if and only if the rank is full and each cocircuit has components of both signs.
+A facet normal c is normal to dof - 1 columns of W, and y = c . W is a vector of the row space with the fewest non-zero
+components. They decide what cables can do. Tensions at a distance s from all limits give a wrench w, W t = w, if and
+only if for each such y and any tensions t0 with W t0 = w the product y . t0 keeps a distance, which grows with s, from
+the bounds that the limits set (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010).
+Every wrench can be resisted if and only if the rank is full and each y has components of both signs.
 
-There are two ways to compute all cocircuits: y = c . W, with c normal to dof - 1 columns; and, with six components and
-at most eight cables, the relations among the rows of the null space. One lane a pose: all numbers are arrays (...) of
-one shape.
+There are two methods to compute all y: from c; and, with six components and at most eight cables, from the relations
+among the rows of the null space. One lane a pose: all numbers are arrays (...) of one shape.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cspr_jax.robots.statics.wrench_sets import spanning
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
 MAX_OTHERS = 2
-# Columns are unit vectors: a vector that is shorter than this at every pose that was tried is no cocircuit.
+# Columns are unit vectors: a vector that is shorter than this at every pose that was tried is no normal.
 NOTHING = 1e-12
 
 Column = Sequence[Array]
@@ -47,7 +47,7 @@ class CableSubsets(NamedTuple):
 
 
 def choices_of(matrices: Float[np.ndarray, "n dof n_cables"]) -> CableSubsets:
-    """Choices of dof - 1 cables that give a cocircuit at some pose; four cables at one point never do."""
+    """Choices of dof - 1 cables that have a facet normal at some pose; four cables at one point never do."""
     _check_finite(matrices)
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)
@@ -121,7 +121,7 @@ def product(a: Sequence[Array], b: Sequence[Array]) -> Float[Array, "..."]:
 
 
 def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
-    """Relation among rows of the null space, one row more than it has columns: a cocircuit of their cables."""
+    """Relation among rows of the null space, one row more than it has columns: a y that is 0 for all other cables."""
     if len(rows) == 2:
         return (rows[1][0], -rows[0][0])
     i, j, k = rows

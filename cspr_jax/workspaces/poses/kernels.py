@@ -1,4 +1,4 @@
-"""Compiled margins of many poses: loops over the cocircuits of a robot, one lane a pose.
+"""Compiled margins of many poses: loops over the facet normals of a robot, one lane a pose.
 
 The body of a loop is compiled once, whatever the number of cables. Its result is one complex number, the lower bound of
 the margin and the upper one: with two results XLA would compute everything twice.
@@ -30,7 +30,7 @@ from cspr_jax.workspaces.poses.facet_normals import (
 )
 from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, FacetLimits, Wrenches, length, one_norm
 
-# Up to so many cocircuits the loop is unrolled.
+# Up to so many facet normals the loop is unrolled.
 UNROLLED = 10
 
 
@@ -112,7 +112,7 @@ def _row(array: Array, k: Array) -> Array:
 def _smallest_margin(
     facet, table: np.ndarray, limits, template: Array, tension_limits: TensionLimits, *, measure: str, is_bounded: bool
 ) -> Array:
-    # Return the least margin of all cocircuits.
+    # Return the least margin of all facet normals.
     margin_of = margins.bounded_margin if is_bounded else margins.free_margin
 
     def step(bounds, each):
@@ -139,7 +139,7 @@ class NullSpace(NamedTuple):
         rows: for each cable beyond the first six (n_cables, n): how tensions change with its tension, times a common
             number.
         held: (n_cables, n) tensions that supply the wrench, N; 0 beyond the first six.
-        noise: (n,) error of a cocircuit's component.
+        noise: (n,) error of the product of a facet normal with a cable.
         loss: (n,) error of the held tensions, N.
         largest: (n,) the largest of the held tensions, N.
     """

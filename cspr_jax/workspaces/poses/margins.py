@@ -1,4 +1,4 @@
-"""Margins of poses, cocircuit by cocircuit, between two bounds that show what rounding may have decided.
+"""Margins of poses, one facet normal after the other, between two bounds that allow for rounding.
 
 Where the bounds lie apart, `workspaces.poses.exact` answers the pose by singular values.
 """
@@ -36,7 +36,7 @@ class Wrenches(NamedTuple):
 
 
 class FacetLimits(NamedTuple):
-    """A cocircuit with the limits of its cables.
+    """A facet normal, by its products with the cables, and the limits of these cables.
 
     Fields:
         entries: components that need not be zero, of any common length.
@@ -45,7 +45,7 @@ class FacetLimits(NamedTuple):
         divisor: of the margin: the sum of the absolute components for tensions, the length of the normal for the
             capacity margin.
         noises: errors of the components.
-        error: of the difference between tensions and wrenches along the cocircuit, in units of the divisor times N.
+        error: of the difference between tensions and wrenches along the facet normal, in units of the divisor times N.
     """
 
     entries: Sequence[Array]
@@ -84,7 +84,7 @@ def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
 
 
 def bounded_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
-    """Bounds of the margin of one cocircuit whose cables all have a largest tension."""
+    """Bounds of the margin of one facet normal whose cables all have a largest tension."""
     limits = list(zip(facet.entries, facet.low, facet.high, strict=True))
     ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
     middles = [(0.5 * (high + low)) * y for y, low, high in limits]
@@ -102,7 +102,7 @@ def _between(facet: FacetLimits, sure: Array, possible: Array) -> Bounds:
 
 
 def free_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
-    """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
+    """Bounds of the margin of one facet normal; any of its cables may have no largest tension.
 
     A component that may be zero but for rounding frees the upper bound, but not the lower one.
     """
@@ -119,7 +119,7 @@ def free_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
 
 
 def closure_margin(facet: FacetLimits) -> Bounds:
-    """Bounds of the margin of wrench closure of one cocircuit."""
+    """Bounds of the margin of wrench closure of one facet normal."""
     fewest = jnp.minimum(largest(facet.entries), largest([-entry for entry in facet.entries]))
     inverse = 1.0 / largest([jnp.abs(entry) for entry in facet.entries])
     error = 2.0 * largest(facet.noises) * inverse

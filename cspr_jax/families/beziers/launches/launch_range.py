@@ -1,4 +1,4 @@
-"""Range of launches: to each landing place the release, and the one Bezier segment from rest, that reach it.
+"""Range of launches: for each landing point, the release and the Bezier segment from rest that reach it.
 
 Unknowns are the position of the release, the time of the flight, the duration of the segment, and when the object is
 released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
@@ -33,7 +33,7 @@ UNKNOWNS, POPULATION = 6, 64
 # Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
 # there, and proved later.
 EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
-# Landing places at a time where the answers are made.
+# Landing points at a time where the answers are made.
 TOGETHER = 512
 
 
@@ -71,7 +71,7 @@ class Shot(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class LaunchRange(Releases):
-    """Launches to n landing places by one Bezier segment each; see `Releases`.
+    """Launches to n landing points by one Bezier segment each; see `Releases`.
 
     A verdict of 0 says that the segment is proved feasible; else it is that of the segment with the largest margin
     found, which does not say that there is no other. Margins are smallest slacks, of taut cables, depth and limits.
@@ -115,7 +115,7 @@ def launch_range(
     bounds: ReleaseBounds,
     population: int = POPULATION,
 ) -> LaunchRange:
-    """Launches of least speed, and the largest margins, to landing places."""
+    """Launches of least speed to landing points, and the largest margins."""
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
     margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
     unknowns = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)
@@ -129,7 +129,7 @@ def launch_range(
 def _answers(
     problem_and_bounds: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]
 ) -> LaunchRange:
-    # Put one candidate for every landing place and margin behind another: the margins change fastest.
+    # One candidate for every landing point and margin, in one array in which the margins change fastest.
     count, n_margins, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, n_margins, axis=0), cases[0])
     shots = in_batches(
@@ -162,7 +162,7 @@ def _answers(
 def _verdicts_and_margins(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     # Verdicts of motions in batches of one length, whatever is asked for.
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
-    judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
-    verdict = np.concatenate([x.verdict for x in judgements])
-    margin = np.concatenate([smallest_slacks(problem, x) for x in judgements])
+    results = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
+    verdict = np.concatenate([x.verdict for x in results])
+    margin = np.concatenate([smallest_slacks(problem, x) for x in results])
     return verdict.reshape(shape), margin.reshape(shape)

@@ -16,7 +16,7 @@ _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release
 
 
 class LaunchRangeMap(ReleasesMap):
-    """The launch of least speed to each landing place; see `GridMap`."""
+    """The launch of least speed to each landing point; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""

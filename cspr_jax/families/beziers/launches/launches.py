@@ -17,7 +17,7 @@ from cspr_jax.launch.flight import aimed, flown
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.constrained_minima import constrained_minimum
 
-# Parts of the duration of its segment between which a release is searched for.
+# Fractions of the duration of its segment between which a release is searched for.
 EARLIEST, LATEST = 0.05, 0.95
 
 
@@ -107,7 +107,7 @@ def _landing(arguments, x: Array) -> tuple[Array, Array]:
 
 
 def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> LaunchSequence:
-    """The launch, with everything that is left open chosen."""
+    """The launch, with a choice of all that is left open."""
     launch = Launch(*(value if value is None else jnp.asarray(value) for value in launch))
     if choose == "energy":
         launch = launch._replace(time=jnp.asarray(_searched(problem, launch, durations, _speed).time))

@@ -33,7 +33,7 @@ def through(
     return middle, end
 
 
-# Parts of the duration of the segment between which a release is searched for.
+# Fractions of the duration of the segment between which a release is searched for.
 EARLIEST, LATEST = 0.01, 0.99
 
 

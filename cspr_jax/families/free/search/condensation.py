@@ -16,7 +16,7 @@ import numpy as np
 from cspr_jax.families.free.search.derivatives import EquationValues
 from cspr_jax.numerics.shapes import Float
 
-# Part of its trace that keeps a matrix regular which is only so within rounding.
+# Fraction of its trace that is added to a matrix, which may be singular within rounding.
 ROUNDED = 1e-14
 
 

@@ -22,24 +22,24 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime.persistent_jit import persistent_jit
-from cspr_jax.verification.criteria import judged_poses
+from cspr_jax.verification.criteria import pose_conditions
 
 BATCH = 256
-# Entries of x behind the coordinates.
+# Entries of x after the coordinates and their derivatives.
 SCALARS = 2
 # Powers of one over the duration, by which derivatives in normalised time become those in time.
 POWERS = np.arange(3.0)
 
 
 class EquationValues(NamedTuple):
-    """Equations at samples, whose residuals are those of the tensions and less other values, and their derivatives.
+    """Residuals of the equations at samples, as far as they depend on the state and on tensions, and their derivatives.
 
     Derivatives are by x: the coordinates, their first and second derivatives in normalised time, the duration, and the
     level of the objective, on which the equations do not depend.
 
     Fields:
-        residual: (..., n_equations) without the other values: what tensions miss of the wrench, over the weight; then
-            less the other values of the state.
+        residual: (..., n_equations) what tensions miss of the wrench, over the weight; then minus the values other than
+            tensions that the state has, to which the unknown values are added.
         jacobian: (..., n_equations, n_x).
         matrix: (..., dof, n_cables) wrenches of unit tensions.
         hessian: (..., n_x, n_x) second derivatives of the residuals times multipliers.
@@ -59,7 +59,7 @@ def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, sam
         missed = residual_at(robot, limits, reference, _motion(normalised, duration), tensions)
         if longest is not None:
             missed = jnp.append(missed, -duration / longest)
-        if not judged_poses(robot)[0]:
+        if not pose_conditions(robot)[0]:
             return missed
         zero = jnp.zeros_like(normalised[0])
         return jnp.append(missed, -determinant(robot, state_of(robot, reference, normalised[0], zero, zero)))
@@ -88,7 +88,7 @@ def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, samples: tup
         residual, d = missed(*motion), normalised.shape[1]
         jacobian = jnp.concatenate([jax.jacfwd(missed, k)(*motion) for k in range(3)], axis=1)
         duals, by_matrix = multipliers[: len(residual)], jnp.zeros((robot.dof, robot.n_cables))
-        regular = with_derivatives(matrix, motion[0]) if judged_poses(robot)[0] else None
+        regular = with_derivatives(matrix, motion[0]) if pose_conditions(robot)[0] else None
         if regular is not None:
             by_matrix = -multipliers[-1] * regular.cofactors
 
@@ -114,7 +114,7 @@ def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, samples: tup
 
 
 def _hessian(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
-    # Second derivatives by all of a motion, (3 d, 3 d): the further one differentiates, the fewer arguments are left.
+    # Second derivatives by coordinates, velocities and accelerations, (3 d, 3 d), each pair of these once.
     parts: list[tuple[Array, ...]] = [jax.jacfwd(jax.grad(function, range(k, 3)), k)(*motion) for k in range(3)]
     return jnp.block([[parts[k][i - k] if k <= i else parts[i][k - i].T for k in range(3)] for i in range(3)])
 

@@ -1,8 +1,8 @@
 """Determinants of the wrenches of unit tensions, and their derivatives.
 
 A determinant is a sum of products of minors of three rows, and such a minor is linear in each of its columns. So its
-second derivatives need no more than first derivatives of the wrenches, and cofactors; all are polynomials, which are
-numbers where the determinant vanishes, too.
+second derivatives need no more than first derivatives of the wrenches, and cofactors; all are polynomials, which stay
+finite where the determinant vanishes.
 """
 
 from __future__ import annotations
@@ -94,14 +94,14 @@ def _minors(rows: Array) -> Array:
     )
 
 
-def _weighted(weights: Array, rows: Array, slopes: Array) -> tuple[Array, Array]:
-    # Derivatives of a sum of minors times weights by the rows, (3, n), and second ones by coordinates, (d, d), from the
-    # first ones of the rows, (3, n, d).
+def _weighted(weights: Array, rows: Array, derivatives: Array) -> tuple[Array, Array]:
+    # Derivatives of a sum of weighted minors: first ones by the rows, (3, n), and second ones by coordinates, (d, d),
+    # from the derivatives of the rows, (3, n, d).
     alternating, across = _alternating(rows.shape[1]), _alternating(MINOR)[0]
     products = jnp.einsum("klm,cm->klc", jnp.tensordot(weights, alternating, 1), rows)
     matrices = jnp.einsum("klc,abc->klab", products, across)
     cofactors = 0.5 * jnp.einsum("klab,bl->ak", matrices, rows)
-    return cofactors, jnp.einsum("aki,klab,blj->ij", slopes, matrices, slopes)
+    return cofactors, jnp.einsum("aki,klab,blj->ij", derivatives, matrices, derivatives)
 
 
 @cache
@@ -118,7 +118,7 @@ def _alternating(count: int) -> np.ndarray:
 
 @cache
 def _laplace(count: int) -> tuple[Any, np.ndarray]:
-    # Signs of the minors of the first three rows in Laplace's expansion; numbers of the minors that belong to them.
+    # Signs of the minors of the first three rows in Laplace's expansion, and indices of their complementary minors.
     sets = list(itertools.combinations(range(count), MINOR))
     rest = [tuple(column for column in range(count) if column not in columns) for columns in sets]
     signs = np.array([(-1.0) ** (sum(columns) - MINOR) for columns in sets])

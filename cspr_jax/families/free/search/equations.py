@@ -2,7 +2,7 @@
 
 Values are the tensions over the weight, and whatever else limits bound, over the limit. Tensions are unknowns of their
 own: equations say that they balance the motion, and that all other values are those of its state. So redundant cables
-need no rule, and no matrix is inverted, which may be singular on the path.
+need no rule, and no matrix is inverted; that of a platform may be singular on the path.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from cspr_jax.robots.model.point_mass import in_one_plane, plane_normal, spool_r
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.criteria import BELOW, Criterion, judged_poses
+from cspr_jax.verification.criteria import BELOW, Criterion, pose_conditions
 
 BATCH = 128
-# Entries of x behind the coordinates.
+# Entries of x after the coordinates and their derivatives.
 SCALARS = 2
 # Smallest depth below the plane of the spools, over the robot's radius, that a search allows.
 DEPTH = 0.02
@@ -51,13 +51,13 @@ def state_of(robot: AnyRobot, reference: Float[Array, "4"], *motion: Float[Array
         jnp.zeros(4).at[0].set(first).at[1 + about].set(part[len(along) :])
         for part, first in zip(motion, (1.0, 0.0, 0.0), strict=True)
     )
-    rotation, spin, spin_rate, _ = turning_of(*(rotations.product(one, reference) for one in quaternions))
-    return State(position, velocity, acceleration, rotation, spin, spin_rate)
+    turning = turning_of(*(rotations.product(one, reference) for one in quaternions))
+    return State(position, velocity, acceleration, *turning[:3])
 
 
 def keeps_depth(robot: AnyRobot) -> bool:
     """Tell whether the depth below the plane of the spools is a value."""
-    return judged_poses(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
+    return pose_conditions(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
 
 
 def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
@@ -90,7 +90,7 @@ def residual_at(
     motion: Sequence[Array],
     tensions: Float[Array, "n_cables"],
 ) -> Float[Array, "n_equations"]:
-    """Residual of the equations, but those of duration and determinant, at one time."""
+    """Residual of the equations at one time, without those of duration and determinant."""
     state, unit = state_of(robot, reference, *motion), wrench_units(robot)
     wrench = robot.wrench_matrix(state) @ tensions - robot.inertial_wrench(state) / (robot.mass * robot.gravity)
     return jnp.concatenate([wrench / unit, -_other_values(robot, limits, state)])
@@ -104,8 +104,8 @@ class ValueBounds(NamedTuple):
         high: (n_values,) inf for none.
         rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
         falls: (n_criteria, n_values) by how much an upper bound falls.
-        determinant: number of the value that is the determinant; None without one.
-        depth: number of the value that is the depth below the plane of the spools, over the robot's radius; None
+        determinant: index of the value that is the determinant; None without one.
+        depth: index of the value that is the depth below the plane of the spools, over the robot's radius; None
             without such a plane.
     """
 
@@ -118,7 +118,7 @@ class ValueBounds(NamedTuple):
 
 
 class _Value(NamedTuple):
-    # A value: bounds, the criteria that they stand for, its cable or -1, and its change with that of the slack.
+    # A value: its bounds, their criteria, its cable or -1, and how much it changes when the slack grows by 1.
     low: float
     high: float
     low_flag: Verdict
@@ -142,7 +142,7 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
             top = maximum / radius if limit.is_height else 1.0
             bottom = -1.0 if limit.quantity in ("speed", "acceleration") else -np.inf
             values.append(_Value(bottom, top, limit.flag, limit.flag, k if limit.per_cable else -1, change))
-    is_regular, _ = judged_poses(robot)
+    is_regular, _ = pose_conditions(robot)
     is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
         minimum = DEPTH if is_divided else -np.inf
@@ -150,7 +150,7 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
     if is_regular:
-        # Bounded on the side of the poses, as the depth: `poses.tasks_of`.
+        # The determinant keeps its sign at the poses: `poses.tasks_of` sets that bound, as it does for the depth.
         values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0))
 
     def changes(side: str, bound: str) -> np.ndarray:

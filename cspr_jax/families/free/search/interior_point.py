@@ -1,8 +1,8 @@
 """Search for the best motions: a primal-dual interior-point method for many motions at once.
 
-Bounds are kept by barriers. Equations may be missed at a price, whose multipliers are those of the last optimum
-(an augmented Lagrangian), so that from every start the search can descend to a motion that meets them; barriers and
-what may be missed fall together. Steps are Newton's, no longer than the merit falls.
+Bounds are kept by barriers. Residuals of the equations are penalised (an augmented Lagrangian, with the multipliers of
+the last optimum), so that from every start the search can descend to a motion without residuals; the weights of the
+barriers and the softness of the equations fall together. Steps are Newton's, as long as the merit falls along them.
 """
 
 from __future__ import annotations
@@ -19,17 +19,15 @@ from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints, 
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Bool, Float
 
-# Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
+# Weight of the barriers at the start and at the end, and the factor and the power by which it falls.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
 SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
-# Errors of Newton's equations, over the weight of the barriers, with which these fall; by how much equations are missed
-# in the end.
-CLOSE, MISSED = 10.0, 1e-6
-# Steps, all and for one weight of the barriers.
-STEPS, PATIENCE = 250, 80
-# Part of the range by which values are inside their bounds at the start, at least, and at most.
+CLOSE = 10.0  # errors of Newton's equations, over the weight of the barriers, at which that weight falls
+MISSED = 1e-6  # largest residual of the equations in the end
+STEPS, PATIENCE = 250, 80  # in all, and for one weight of the barriers
+# Distance of values from their bounds at the start: at most this fraction of the range, and at most this number.
 INSIDE, AWAY = 0.1, 1e-2
-# Largest ratio of multipliers of bounds and barriers over gaps, and of the latter and the former.
+# Multipliers of bounds differ from barriers over gaps by at most this factor.
 MAX_RATIO = 1e10
 
 
@@ -43,7 +41,7 @@ class Ending(NamedTuple):
     Fields:
         until: s.
         enough: from then on one optimum of each task is enough, s.
-        of_task: (l,) numbers of the tasks; () where nothing is enough.
+        of_task: (l,) indices of the tasks; () where nothing is enough.
     """
 
     until: float = np.inf
@@ -78,7 +76,7 @@ class Optima(NamedTuple):
 
 
 def _sharpened(points: SearchPoints, levels: Levels) -> tuple[Levels, np.ndarray]:
-    # Weights and softness, smaller where their optimum is reached; errors.
+    # Reduce weights and softness where their optimum is reached; return them with the errors.
     barrier, (softness, metric, level) = levels
     while True:
         levels = Levels(barrier, Softness(softness, metric, level))
@@ -123,7 +121,7 @@ def optima(
 
 
 def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
-    # Puts motions into the result as their searches end; whether all have ended in time.
+    # Put motions into the result as their searches end, and tell whether all have ended in time.
     indices = np.arange(len(result.steps))
     regularization, waited = np.zeros(len(indices)), np.zeros(len(indices))
     for number in range(STEPS + 1):
@@ -156,7 +154,7 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
 
 
 def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
-    # Multipliers of bounds not too far from barriers over gaps.
+    # Keep the multipliers of bounds near barriers over gaps.
     unknowns, multipliers = points.unknowns, []
     for multiplier, gap in zip(
         (unknowns.low_multipliers, unknowns.high_multipliers), points.tasks.gaps(unknowns), strict=True

@@ -13,9 +13,11 @@ from cspr_jax.families.free.search.derivatives import SCALARS, EquationValues
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Float
 
-# Added to the diagonal where the matrix has a negative curvature: smallest, at first, and largest; by what it grows and
-# shrinks; tries.
-MIN_REGULARIZATION, MAX_REGULARIZATION, GROWING, SHRINKING, TRIES = 1e-6, 1e6, 6.0, 3.0, 25
+# Regularization, which is added to the diagonal where the matrix is not positive definite.
+MIN_REGULARIZATION, MAX_REGULARIZATION = 1e-6, 1e6
+GROWING = 6.0  # factor from one try of a step to the next
+SHRINKING = 3.0  # divisor from a step to the first try of the next step
+TRIES = 25
 
 
 class Step(NamedTuple):
@@ -25,8 +27,8 @@ class Step(NamedTuple):
         change: of the unknowns.
         merit_derivative: (l,) derivative of the merit along it.
         regularization: (l,) what was added to the diagonal.
-        missed: (l, s, m, n, n_equations) change of what equations miss, to first order.
-        weights: (l, s, m, n, n_values) of the bounds of the values.
+        missed: (l, s, m, n, n_equations) change of the residuals of equations, to first order.
+        weights: (l, s, m, n, n_values) second derivatives of the barriers by the values.
     """
 
     change: Unknowns
@@ -135,7 +137,7 @@ def _solved(
 def _changes(
     tasks: Tasks, unknowns: Unknowns, segments: _Bordered, regularization: np.ndarray
 ) -> tuple[Unknowns, np.ndarray]:
-    # Changes of control points, durations, accelerations and levels, with what had to be added to the diagonal.
+    # Changes of control points, durations, accelerations and levels, and the numbers added to the diagonal.
     count, d = len(unknowns.duration[0]), tasks.ends.shape[-1]
     changes = [np.zeros_like(part) for part in unknowns[:4]]
     used = np.zeros(len(regularization))
@@ -147,8 +149,8 @@ def _changes(
         tries = min(max(MIN_REGULARIZATION, regularization[k] / SHRINKING), MAX_REGULARIZATION) * GROWING ** np.arange(
             TRIES
         )
-        for more in tries if solution is None else ():
-            solution, used[k] = _solved(segments, k, is_moving, more), more
+        for trial in tries if solution is None else ():
+            solution, used[k] = _solved(segments, k, is_moving, trial), trial
             if solution is not None:
                 break
         if solution is not None:
@@ -203,13 +205,13 @@ def _with_objective(
     gaps: tuple[np.ndarray, np.ndarray],
     barrier: np.ndarray,
 ) -> tuple[EquationValues, np.ndarray, np.ndarray, np.ndarray]:
-    # Equations with mixed derivatives of objective and barriers, weights and right-hand side of the values, and the
-    # derivative by duration and level, (l, s, 2).
+    # Return the equations, to which derivatives of objective and barriers are added; second derivatives and right-hand
+    # side of the values; and the derivative of the objective by duration and level, (l, s, 2).
     objective, cables, energy_weights = tasks.objective, tasks.robot.n_cables, tasks.energy_weights
     lifts, signs = (objective.low_lift, objective.high_lift), (1.0, -1.0)
     weights = [old / gap for old, gap in zip((unknowns.low_multipliers, unknowns.high_multipliers), gaps, strict=True)]
-    pushes = [sign * barrier / gap for sign, gap in zip(signs, gaps, strict=True)]
-    weight, value_right = sum(weights), sum(pushes)
+    barrier_gradients = [sign * barrier / gap for sign, gap in zip(signs, gaps, strict=True)]
+    weight, value_right = sum(weights), sum(barrier_gradients)
     tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
     weight[..., :cables] += 2.0 * energy_weights * duration
     value_right[..., :cables] -= 2.0 * energy_weights * duration * tensions
@@ -217,7 +219,9 @@ def _with_objective(
     mixed[..., -2] += 2.0 * energy_weights * tensions
     mixed[..., -1] -= sum(part * lift for part, lift in zip(weights, lifts, strict=True))[..., :cables]
     hessian[..., -1, -1] += sum((part * lift**2).sum(-1) for part, lift in zip(weights, lifts, strict=True))
-    by_level = objective.level + sum((part * lift).sum((2, 3, 4)) for part, lift in zip(pushes, lifts, strict=True))
+    by_level = objective.level + sum(
+        (part * lift).sum((2, 3, 4)) for part, lift in zip(barrier_gradients, lifts, strict=True)
+    )
     by_duration = objective.time / tasks.scale[:, None] + np.sum(energy_weights * tensions**2, axis=(2, 3, 4))
     by_scalars = np.stack([by_duration, by_level], axis=-1)
     return equations._replace(mixed=mixed, hessian=hessian), weight, value_right, by_scalars

@@ -14,7 +14,7 @@ import numpy as np
 from cspr_jax.families.free.search.equations import ValueBounds
 from cspr_jax.numerics.shapes import Bool, Float
 
-# Weight of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
+# Weight of the time, in half swings, in objectives that are levels: a hundredth of a half swing adds 1e-6.
 LITTLE = 1e-4
 
 

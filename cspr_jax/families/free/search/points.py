@@ -13,9 +13,8 @@ from cspr_jax.families.free.search.newton import Step, assembled_gradient
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Float
 
-# Multipliers of equations beyond which their mean counts as the unit of errors; keeps the metric of the tensions
-# regular.
-LARGE, REGULAR = 100.0, 1e-6
+LARGE = 100.0  # mean multiplier of bounds above which errors are measured relative to it
+REGULAR = 1e-6  # added to the metric of the tensions, so that it is regular
 
 
 class Levels(NamedTuple):
@@ -93,9 +92,9 @@ class SearchPoints:
         return np.maximum(largest / unit, np.abs(price).reshape(count, -1).max(1))
 
 
-# Halvings of a step; part of the distance to a bound that one goes, and that a correction goes; part of its derivative
-# by which the merit falls at least.
-HALVINGS, FRACTION, CORRECTED, DESCENT = 8, 0.99, 0.9, 1e-4
+HALVINGS = 8  # of a step, at most
+FRACTION, CORRECTED = 0.99, 0.9  # fractions of the distance to a bound that steps, and corrections, may go
+DESCENT = 1e-4  # by which the merit must fall, over its derivative times the step
 
 
 def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
@@ -138,8 +137,8 @@ def _merit(tasks: Tasks, unknowns: Unknowns, residual: np.ndarray, levels: Level
 def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
     """Go a step, halved until the merit falls.
 
-    A trial from which it does not fall is tried once more with values that make up for the curvature of the equations
-    (a second-order correction): for platforms, whose wrenches change with every turn, steps are too short without.
+    A trial at which it does not fall is tried once more with values that make up for the curvature of the equations
+    (a second-order correction). Without it, steps of platforms, whose wrenches change with rotation, are too short.
     """
     primal, dual = _lengths(points, step)
     before = _merit(points.tasks, points.unknowns, points.residual, levels)
@@ -151,7 +150,7 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
         minimum = (
             before[indices] + DESCENT * primal[indices] * change.merit_derivative + 1e-12 * np.abs(before[indices])
         )
-        # Not above: a merit that is no number does not fall.
+        # Not written as "above": a merit of NaN does not fall.
         is_over = ~(_merit(part.tasks, trial, residual, level) <= minimum)
         if not is_over.any():
             break
@@ -170,7 +169,7 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
 
 
 def _correction(points: SearchPoints, trial: Unknowns, step: Step, missed: np.ndarray, levels: Levels) -> np.ndarray:
-    # Changes of the values of a trial, inside their bounds, for what equations miss beyond the step's own prediction.
+    # Changes of the values of a trial, inside their bounds, that make up for residuals which the step did not predict.
     change = repaired_values(points.equations.matrix, step.weights, missed, levels.soft)
     low, high = (np.where(np.isfinite(gap), CORRECTED * gap, np.inf) for gap in points.tasks.gaps(trial))
     return np.clip(change, -low, high)

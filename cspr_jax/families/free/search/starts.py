@@ -13,8 +13,8 @@ from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point, spool_radius
 
-# Largest number of arcs of swings; by how much of their length lines are deflected.
-ARCS, DEFLECTION = 3, 0.35
+ARCS = 3  # largest number of arcs of swings
+DEFLECTION = 0.35  # of lines, over their length
 # Durations of lines over those of motions with the acceleration of gravity.
 SLOWER = 1.3
 
@@ -23,7 +23,7 @@ class Starts(NamedTuple):
     """Motions of one segment each.
 
     Fields:
-        task: (n,) numbers of the tasks.
+        task: (n,) indices of the tasks.
         controls: (n, 1, K, d) control points.
         duration: (n, 1) s.
     """
@@ -44,7 +44,7 @@ def starts(tasks: Tasks, z0: float, max_count: int | None = None) -> Starts:
     for start, end in tasks.ends[:, 0]:
         lines = _lines(tasks, start, end)
         swings = _swings(tasks, start, end, z0, ARCS if max_count is None else max(1, max_count - len(lines)))
-        # Few starts are of both kinds.
+        # Alternate, so that a small number of starts has both kinds.
         begun += [one for pair in zip_longest(lines, swings) for one in pair if one is not None][:max_count]
     task = np.repeat(np.arange(len(tasks.ends)), len(begun) // len(tasks.ends))
     controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array([one.samples for one in begun]))
@@ -58,7 +58,7 @@ class _Start(NamedTuple):
 
 
 def _line(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    # At rest only at the ends, where accelerations do not vanish.
+    # The cubic law: at rest only at the ends, with accelerations there.
     tau = tasks.basis.averages[:, None]
     return start + (end - start) * (3.0 * tau**2 - 2.0 * tau**3)
 

@@ -23,7 +23,7 @@ OUTER = 3
 
 
 def wide(numbers: np.ndarray) -> np.ndarray:
-    """Numbers of motions, or of their segments, beside their values at samples."""
+    """Numbers of motions (l,), or of segments (l, s), in a shape that broadcasts to values at samples."""
     return numbers.reshape(*numbers.shape, *[1] * (5 - numbers.ndim))
 
 
@@ -56,12 +56,12 @@ class Unknowns(NamedTuple):
 
 
 class ClearancePlanes(NamedTuple):
-    """Values at + gradient . coordinates that have lower bounds beside those of limits, K at each sample.
+    """Values at + gradient . coordinates, K at each sample, which have lower bounds as the values of limits have.
 
     Fields:
         gradient: (l, s, m, n, K, d).
         at: (l, s, m, n, K).
-        minimum: of each the index of the pair of bodies, and the clearance that it stands for, m.
+        minimum: index of the pair of bodies, and their smallest clearance, m, for each plane.
     """
 
     gradient: np.ndarray
@@ -75,17 +75,17 @@ class Tasks:
 
     Fields:
         robot: centred, z down.
-        limits: of it.
+        limits: of the robot.
         basis: of all segments.
         ends: (l, s, 2, d) coordinates at start and end of each segment, m; Rodrigues vectors.
         velocities: (l, s, 2, d) there, m/s, rad/s.
-        references: (l, s, 4) orientations from which Rodrigues vectors count.
-        turns: (l, s, 2, d, d) second derivatives of the coordinates from accelerations.
+        references: (l, s, 4) orientations from which Rodrigues vectors are measured.
+        turns: (l, s, 2, d, d) matrices that turn accelerations into second derivatives of the coordinates.
         accelerations: (l, s + 1, d) at the poses, m/s^2, rad/s^2, where they are given.
         is_free: (l, s + 1) whether they are not.
         low: (l, s, m, n, n_values) lower bounds at level 0, -inf for none.
         high: (l, s, m, n, n_values) upper bounds at level 0, inf for none.
-        scale: (l,) half a swing, s, over which durations count.
+        scale: (l,) unit of durations in the objective: half a swing, s.
         objective: what is minimised.
         longest: () longest duration of a segment, s; None for any.
         planes: their values are the last ones; None without any.
@@ -135,7 +135,7 @@ class Tasks:
         )
 
     def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
-        """Unknowns of these tasks as those of tasks with other planes."""
+        """Unknowns of these tasks, from those with other planes: with the values of the planes, and multipliers 0."""
         old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
 
         def changed(values: np.ndarray) -> np.ndarray:
@@ -192,7 +192,7 @@ class Tasks:
 
     @property
     def border(self) -> np.ndarray:
-        """Numbers of the outer coordinates that move, of all K d of a segment, (4 d,)."""
+        """Indices of the outer coordinates that move, among all K d of a segment, (4 d,)."""
         d, last = self.ends.shape[-1], self.basis.controls * self.ends.shape[-1]
         return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
 
@@ -268,7 +268,7 @@ class Tasks:
         )
 
     def _samples(self, unknowns: Unknowns) -> tuple[Any, ...]:
-        # Arguments of the equations at all samples, but multipliers.
+        # Arguments of the equations at all samples, except multipliers.
         shape = unknowns.values.shape[:-1]
         return (
             self.robot,

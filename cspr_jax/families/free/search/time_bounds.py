@@ -23,12 +23,12 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
-from cspr_jax.verification.criteria import judged_poses
+from cspr_jax.verification.criteria import pose_conditions
 
-# Directions in the vertical plane through both positions; what bounds are lowered by, more than their rounding.
-ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
-# Heights of spools over the robot's radius that count as equal, and what that may add to a component.
-LEVEL, SLANTED = 1e-12, 1e-5
+ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)  # of directions in the vertical plane through both positions
+SAFE = 1e-9  # fraction by which bounds are lowered, more than their rounding
+LEVEL = 1e-12  # differences of heights of spools, over the robot's radius, that count as none
+SLANTED = 1e-5  # what such a difference may add to the upward component of a cable's direction
 Numbers = np.ndarray | float
 
 
@@ -72,7 +72,7 @@ def _ends(robot: AnyRobot, motion: Spline) -> tuple[Array, Array]:
 def _of_mass_centre(problem: Problem, displacement: np.ndarray) -> float:
     robot, limits = problem.robot, problem.limits
     level = np.linalg.norm(displacement[:2])
-    # Components along the displacement's level direction and downwards, of directions in which it goes.
+    # Directions in the vertical plane of the displacement, as their level and downward components.
     directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     along = directions @ np.array([level, displacement[2]])
     directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
@@ -80,7 +80,7 @@ def _of_mass_centre(problem: Problem, displacement: np.ndarray) -> float:
     maximum = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
     heights, is_point = np.asarray(robot.base_points)[:, 2], not isinstance(robot, PlatformRobot)
     is_level = float(np.ptp(heights)) <= LEVEL * float(spool_radius(robot)) and robot.pulleys is None
-    are_upward = is_point and is_level and judged_poses(robot)[1]
+    are_upward = is_point and is_level and pose_conditions(robot)[1]
 
     def largest(down: np.ndarray) -> np.ndarray:
         fraction = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if are_upward else np.ones_like(down)

@@ -1,4 +1,4 @@
-"""Corners of paths: elements one behind another, in parts from stop to stop, blended at corners or not.
+"""Corners of paths: consecutive elements, in parts from stop to stop, blended at corners or not.
 
 A blend is a quintic from a point on one element to a point on the next one, with the position, direction and
 curvature that the elements have there. Between straight lines it ends the distance d from the corner, and passes it at
@@ -14,14 +14,13 @@ import numpy as np
 from cspr_jax.families.paths.geometry.elements import Element, Nodes
 from cspr_jax.families.paths.geometry.section import PositionPath
 
-# Directions that differ by less go on, rad; below the second, rounded numbers are to blame, and corners are blended.
-SAME_DIRECTION, ROUNDED_DIRECTION = 1e-9, 1e-3
-# Distance within which such corners are blended, m.
-ROUNDED = 1e-6
-# Sharper corners turn back, so that a motion along a blend would almost stop there, rad.
+SAME_DIRECTION = 1e-9  # rad; directions that differ by less make no corner
+ROUNDED_DIRECTION = 1e-3  # rad; smaller corners come from rounded numbers, and are always blended
+ROUNDED = 1e-6  # m; tolerance of their blends
+# Corners sharper than this, rad, are not blended: a motion along the blend would almost stop.
 TURNING_BACK = 2.9
-# Part of an element that a blend takes at most.
-LARGEST_SHARE = 0.49
+# Largest fraction of an element that a blend replaces.
+MAX_FRACTION = 0.49
 
 Corners = Literal["every", "stop", "blend"]
 
@@ -39,7 +38,7 @@ def position_paths_of(
 
 
 def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: float) -> np.ndarray:
-    # Lengths that blends take off the elements at each corner; 0 where the direction goes on, NaN where motions stop.
+    # Lengths that blends take off the elements at each corner; 0 where the direction is continuous, NaN at stops.
     if corners == "every":
         return np.full(len(elements) - 1, np.nan)
     element_lengths = np.array([element.length for element in elements])
@@ -52,7 +51,7 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
     is_stop = ends_at_rest | ~moves[:-1] | ~moves[1:] | (~is_rounded & ((corners == "stop") | (angles > TURNING_BACK)))
     allowed = np.where(is_rounded, max(tolerance, ROUNDED) if corners == "blend" else ROUNDED, tolerance)
     sines = np.sin(0.5 * np.where(turns, angles, 1.0))
-    largest = LARGEST_SHARE * np.minimum(element_lengths[:-1], element_lengths[1:])
+    largest = MAX_FRACTION * np.minimum(element_lengths[:-1], element_lengths[1:])
     lengths = np.where(turns, np.minimum((1.0 - 1e-12) * allowed / (0.375 * sines), largest), 0.0)
     lengths[is_stop] = np.nan
     open_corners = np.flatnonzero(lengths > 0.0)
@@ -69,7 +68,7 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
 
 
 def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarray) -> Nodes:
-    # Middles of quintics from last nodes to first ones, over twice the lengths.
+    # Middles of blends from the last node of one element to the first node of the next, each twice its length long.
     _, position, first, second = (np.array([column[-1] for column in columns]) for columns in zip(*before, strict=True))
     _, *ends = (np.array([column[0] for column in columns]) for columns in zip(*after, strict=True))
     length = lengths[:, None]
@@ -82,7 +81,7 @@ def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarra
 
 
 def _position_path(elements: Sequence[Element], lengths: np.ndarray) -> PositionPath:
-    # Join elements, of which the lengths, one more than elements, are taken off at both ends.
+    # Join elements, with blends in place of the given lengths at their ends; the first and the last length are 0.
     lines = [
         element.nodes(before, element.length - after)
         for element, (before, after) in zip(elements, itertools.pairwise(lengths.tolist()), strict=True)

@@ -15,7 +15,7 @@ from cspr_jax.numerics.shapes import Float
 
 # Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
 LARGEST_PIECE = 0.125
-# Positions that are nearer to each other are one position, m.
+# Positions that are nearer to each other are the same, m.
 SAME_PLACE = 1e-9
 
 
@@ -42,9 +42,9 @@ class Straight:
     Fields:
         start: (3,) m.
         end: (3,) m.
-        turn: travelled length of one that only turns on the spot, in place of m; rad.
+        turn: length of a line without extent, on which a platform only turns: the angle, rad.
         speed: largest speed, m/s.
-        ends_at_rest: whether the motion stops behind it in any case.
+        ends_at_rest: whether the motion stops at its end in any case.
     """
 
     start: np.ndarray
@@ -60,7 +60,7 @@ class Straight:
 
     @cached_property
     def length(self) -> float:
-        """Travelled length, m; of one that only turns its angle, rad."""
+        """Travelled length, m; the angle, rad, where a platform only turns."""
         return float(np.linalg.norm(self.end - self.start)) if self.moves else self.turn
 
     def nodes(self, first: float, last: float) -> Nodes:
@@ -86,7 +86,7 @@ class Arc:
         angle: by which it turns, by the rule of the right hand, rad; not zero.
         rise: along the axis, from start to end, m.
         speed: largest speed, m/s.
-        ends_at_rest: whether the motion stops behind it in any case.
+        ends_at_rest: whether the motion stops at its end in any case.
     """
 
     centre: np.ndarray
@@ -127,7 +127,7 @@ class Arc:
 Element = Straight | Arc
 
 
-# Part of its radius by which an arc may begin beside the plane of its centre: rounding.
+# Distance of the start of an arc from the plane of its centre that counts as rounding, over its radius.
 BESIDE = 1e-6
 
 

@@ -1,4 +1,4 @@
-"""Paths between poses as a table of a plan has them: parts from stop to stop, with orientations at their knots."""
+"""Paths between poses that a table of a plan describes: parts from stop to stop, with orientations at their knots."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class FileAxes(NamedTuple):
 
     Fields:
         z_axis: "up" or "down".
-        normal: (3,) about which arcs turn that have none.
+        normal: (3,) default axis of arcs.
         turning: (4,) rotation from the reference axes of the platform to its axes in the file, a unit quaternion.
     """
 
@@ -56,14 +56,14 @@ class FileAxes(NamedTuple):
 
 
 class PathSpec(NamedTuple):
-    """Paths one behind another, with the motion at rest between them.
+    """Consecutive paths, with the motion at rest between them.
 
     Fields:
         parts: at least one.
         quaternions: for each the orientations at its knots, (k, 4) unit quaternions; empty: of a point mass.
         is_planar: whether it was read without y.
-        feeds: as of `Section`.
-        notes: what its user should know of a file, in lines.
+        feeds: as in `Section`.
+        notes: lines about the file for the user.
     """
 
     parts: list[PositionPath]
@@ -182,7 +182,7 @@ def _check_start(position: np.ndarray, unit: np.ndarray | None, ends: PathEnds, 
 def _between_poses(
     points: np.ndarray, units: np.ndarray | None, ends: PathEnds
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    # Add what the poses before and behind the points have.
+    # Add positions and orientations of the poses before and after the points.
     for position, unit, before in ((ends.start, ends.first, True), (ends.end, ends.last, False)):
         if position is not None:
             points = np.concatenate([position[None], points] if before else [points, position[None]])

@@ -15,7 +15,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 
-# Orientations that differ by less are one orientation; half of the angle, rad.
+# Orientations count as equal if half of the angle between them is less than this, rad.
 SAME_ORIENTATION = 1e-12
 # Largest half of an angle by which a piece turns, rad; a quintic misses a turn at a constant rate by 4e-7 of it.
 LARGEST_TURN = 0.5
@@ -29,7 +29,7 @@ class Section(NamedTuple):
             leaves. Its second derivative may jump between pieces.
         speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
         knots: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
-        feeds: such speeds as G-code has them, by their values in m/s.
+        feeds: words of G-code, such as "F6000", by the speeds that they set, m/s.
     """
 
     curve: Spline
@@ -44,7 +44,7 @@ class SectionSettings(NamedTuple):
     Fields:
         grid: number of cells.
         ramp_time: time in which accelerations rise and fall, s; 0: they jump.
-        start_speed: speed at its start, that of the position and not of s, m/s.
+        start_speed: speed of the mass centre at its start, m/s.
         end_speed: speed at its end, likewise, m/s.
     """
 

@@ -14,9 +14,9 @@ from cspr_jax.families.paths.geometry.elements import SAME_PLACE, Straight
 from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, PositionPath, half_angles
 from cspr_jax.numerics.shapes import Float
 
-# Part of the speed along the chords below which a spline stops, and samples of each of its pieces.
-STANDING, SAMPLES = 1e-6, 32
-# Shortest chord of a spline over its longest one: the digits of its pieces are lost below.
+STANDING = 1e-6  # speed over the speed along the chords, below which a spline stops
+SAMPLES = 32  # of each piece of a spline, to find where it stops
+# Smallest ratio of the shortest to the longest chord of a spline: below it, pieces lose their digits.
 SMALLEST_CHORD = 1e-6
 
 
@@ -59,7 +59,7 @@ def through_points(
     curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
     values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)
     position, first, second = (values(s, order) for order in range(3))
-    # The last value comes from the last piece, so nothing is lost where ends are natural.
+    # The last value comes from the last piece, so that the second derivative of a natural spline is 0 there, too.
     fine = np.concatenate([np.linspace(*ends, SAMPLES, endpoint=False) for ends in itertools.pairwise(s)])
     speeds = np.linalg.norm(values(fine, 1), axis=1)
     if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():

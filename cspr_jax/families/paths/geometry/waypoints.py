@@ -1,4 +1,4 @@
-"""Motions of any kind one behind another: their states at many times, and the smooth parts between their stops."""
+"""Consecutive motions of any kind: their states at many times, and the smooth parts between their stops."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from cspr_jax.errors import InputError
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.shapes import Float, Int
 
-# Samples of a motion among which stops are sought, and the fewest of a smooth part.
-SAMPLES, FEWEST = 2000, 8
-# Part of the largest speed below which a motion is at rest; steps by which the time of a stop is refined.
-AT_REST, STEPS = 1e-9, 80
-# Radius of a turn at the smallest speed, m, below which the motion turns back there.
+SAMPLES, FEWEST = 2000, 8  # of a motion, among which stops are sought, and of a smooth part at least
+AT_REST = 1e-9  # speed over the largest one, below which a motion is at rest
+STEPS = 80  # that refine the time of a stop
+# Radius of curvature at the smallest speed, m, below which the motion counts as turning back.
 CUSP = 4e-10
-# Part of the largest speed by which motions may differ where one goes on from another.
+# Speeds of consecutive motions may differ by this fraction of the largest speed, as rounding.
 MEETS = 1e-6
-# Fraction of a smooth part by which its ends lie inside of it, so that each is evaluated on its own side of a break.
+# Ends of a smooth part are evaluated this fraction of the part inside it, on their own side of a jump.
 INSIDE = 1e-11
 BATCH = 256
 
@@ -29,7 +28,7 @@ class SmoothPart(NamedTuple):
     """Part of a motion over which its acceleration is continuous, and within which it does not stop.
 
     Fields:
-        motion: number of the motion.
+        motion: index of the motion.
         start: tau.
         end: tau.
         at_rest: whether the motion is at rest at the start, and at the end.
@@ -65,11 +64,11 @@ class MovingPoints(NamedTuple):
 
 
 class MotionSequence:
-    """Motions one behind another.
+    """Consecutive motions.
 
     Args:
         motions: n of them.
-        platform_radius: of the platform, m; of no account for a point mass.
+        platform_radius: of the platform, m; unused for a point mass.
 
     Fields:
         duration: (n,) s.
@@ -138,7 +137,7 @@ class MotionSequence:
             smooth, number[index], fraction[index], 1.0 / counts[number[index]], rest_speed
         )
         ends = self.inside(smooth, np.repeat(np.arange(len(smooth)), 2), np.tile([0.0, 1.0], len(smooth)))
-        # A stop at an end is met to INSIDE of the part.
+        # Stops at ends are found to within INSIDE of the part.
         speed_error = np.linalg.norm(ends.acceleration, axis=1) * np.repeat(self.times(smooth), 2) * INSIDE
         is_end = (ends.speed <= rest_speed + 10.0 * speed_error).reshape(-1, 2)
         split_parts: list[SmoothPart] = []

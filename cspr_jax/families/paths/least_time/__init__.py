@@ -1,4 +1,4 @@
-"""Least time along sections of paths: a grid, its constraints, bounds, proof, and accelerations that go on.
+"""Least time along sections of paths: a grid, its constraints, bounds, proof, and continuous accelerations.
 
 Files, each importing only from those above it:
 

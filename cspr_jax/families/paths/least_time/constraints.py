@@ -24,24 +24,22 @@ from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
 from cspr_jax.robots.tensions.nearest_face import beside_faces, one_sided_faces
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
 
-# Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
+# Number of tangents of the largest Cartesian acceleration: half of a polygon around the circle, on the side of p''.
 TANGENTS = 24
-# Squared norms that are taken to be no smaller, so that quotients stay finite.
+# Squared norms are raised to this, so that quotients stay finite.
 TINY = 1e-30
 StateKind = TypeVar("StateKind", State, StateBounds)
 
 
 class HalfPlanes(NamedTuple):
-    """Half-planes u_coefficient u + x_coefficient x <= bound of one point.
-
-    Those that bound tensions are without units.
+    """Half-planes u_coefficient u + x_coefficient x <= bound of one point; those of tensions have no unit.
 
     Fields:
         u: (..., n_rows) coefficient of the path acceleration.
         x: (..., n_rows) coefficient of the squared path speed.
         bound: (..., n_rows) bound.
-        margin_loss: (..., n_rows) what the bound loses for a margin of 1: N of tensions, all of its value of
-            accelerations.
+        margin_loss: (..., n_rows) decrease of the bound for a margin of 1, which is 1 N for tensions and the whole
+            limit for accelerations.
         cap: (...) largest x that speeds allow, inf for none.
     """
 
@@ -64,7 +62,7 @@ class UnitWrenches(NamedTuple):
         matrix: (dof, n_cables) wrenches of unit tensions.
         momentum: of a unit path speed.
         momentum_rate: its derivative along the path.
-        rest: what holds the weight.
+        rest: wrench that holds the weight.
     """
 
     matrix: Array
@@ -109,7 +107,7 @@ def path_half_planes(robot: AnyRobot, limits: Limits, state: State, speed: Float
 
 
 class TensionFaces(NamedTuple):
-    """Faces of the set of wrenches that the cables can give, by what they say of tensions t: along t >= minimum.
+    """Faces of the set of wrenches that the cables can give, as conditions on tensions t: along t >= minimum.
 
     Fields:
         along: (n_faces, n_cables) products of the normals, which point inside, with the cables.

@@ -5,8 +5,8 @@ From the last cell to the first, K = {x : some u in the half-planes of the cell 
 lower one, is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function, and end
 after a few; a derivative that points away from zero proves that K is empty. So no linear program is solved.
 
-Within a cell u changes at a constant rate that is chosen before; half-planes hold at both ends of each cell. Paths are
-the last axis of all arrays, and are solved together.
+Within a cell u changes at a constant rate, which is chosen in advance; half-planes hold at both ends of each cell.
+Paths are the last axis of all arrays, and are solved together.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-# A half-plane whose coefficient of u is smaller bounds x alone. Steps of Newton, at most.
-FLAT, STEPS = 1e-12, 40
-# Part of the numbers in it by which h may miss zero.
+FLAT = 1e-12  # a half-plane with a smaller coefficient of u bounds x alone
+STEPS = 40  # of Newton, at most
+# Rounding error of h, over the largest of its terms.
 CLOSE = 1e-13
 
 
@@ -67,7 +67,7 @@ class GridSolution(NamedTuple):
         high: likewise, the largest.
         x: (n_cells + 1, n_paths) squared path speeds, 1/s^2 times the unit of s^2.
         u: (n_cells, n_paths) path accelerations in the middle of the cells.
-        empty: (n_paths,) number of the last cell without a controllable x; -1: there is none.
+        empty: (n_paths,) index of the last cell without a controllable x; -1: there is none.
         is_start: (n_paths,) whether the start is controllable.
     """
 
@@ -80,7 +80,7 @@ class GridSolution(NamedTuple):
 
 
 class _Bounds(NamedTuple):
-    # Bounds of u as lines in x, offset - rate x: from above, inf of half-planes that are none, and from below, -inf.
+    # Bounds of u as lines in x, offset - rate x: upper ones, or inf where there is none; lower ones, or -inf.
     upper: Array
     lower: Array
     rate: Array
@@ -95,7 +95,7 @@ def _bounds_of(u: Array, x_coefficient: Array, bound: Array) -> _Bounds:
 
 
 def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
-    # h at x, its change with x, and the rounding in it. Reductions alone, since searches for indices are slow.
+    # h at x, its derivative, and its rounding error. By reductions alone, since searches for indices are slow.
     upper, lower = bounds.upper - bounds.rate * x[None], bounds.lower - bounds.rate * x[None]
     beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
     falls = jnp.max(jnp.where(upper <= beta[None], bounds.rate, -jnp.inf), axis=0)
@@ -106,7 +106,7 @@ def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
-    # Follow h from outside to where it is no longer negative; NaN if it is so nowhere.
+    # Find the first x from outside where h is not negative; NaN if there is none.
     def is_open(carry) -> Array:
         _, is_outside, _, step = carry
         return is_outside.any() & (step < STEPS)
@@ -115,7 +115,7 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
         x, is_outside, is_lost, step = carry
         gap, rate, rounding = _gap(bounds, x)
         is_outside &= ~(gap >= -rounding)
-        # A gap that is NaN, beyond an empty set, leads nowhere. The last x is kept where no step leads on.
+        # No step is possible where the gap is NaN, beyond an empty set. The last x is kept where steps have ended.
         leads = (gap < 0.0) & (rate * sign < 0.0)
         is_lost |= is_outside & ~leads
         is_outside &= leads
@@ -127,7 +127,8 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
 
 
 def _flat_range(u: Array, x_coefficient: Array, bound: Array, cap: Array) -> tuple[Array, Array]:
-    # Smallest and largest x by the half-planes that do not bound u, and by the cap; none: the largest is -1.
+    # Smallest and largest x by the half-planes that do not bound u, and by the cap; if none is possible, the largest
+    # is -1.
     is_flat = jnp.abs(u) <= FLAT
     over = jnp.where(jnp.abs(x_coefficient) > FLAT, x_coefficient, 1.0)
     high = jnp.min(jnp.where(is_flat & (x_coefficient > FLAT), bound / over, jnp.inf), axis=0)
@@ -190,7 +191,7 @@ def fastest(
 
 
 def minmod_rates(u: Float[np.ndarray, "n_cells"], width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
-    """Changes of u within cells: of the changes to both neighbours the smaller one, 0 where their signs differ."""
+    """Changes of u within cells: the smaller of the changes to both neighbours, 0 where their signs differ."""
     steps = np.diff(u) / (0.5 * (width[1:] + width[:-1]))
     before, after = steps[:-1], steps[1:]
     rates = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)

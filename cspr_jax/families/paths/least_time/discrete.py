@@ -17,9 +17,9 @@ from cspr_jax.families.paths.least_time.smooth import NodeHalfPlanes
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Float
 
-# Path speeds are taken to be no larger than so many times that of a fall along the path.
+# Path speeds are at most this many times that of a fall along the path.
 FASTER = 1e2
-# Coefficients of x that differ by less at both sides of a node are the same.
+# Coefficients of x on both sides of a node count as equal if they differ by less than this.
 SAME = 1e-6
 
 
@@ -28,8 +28,8 @@ class GridMargins(NamedTuple):
 
     Fields:
         tension: from both ends of the range of every tension, N.
-        acceleration: part of each limit of an acceleration.
-        speed: part of each limit of a speed.
+        acceleration: fraction of each limit of an acceleration.
+        speed: fraction of each limit of a speed.
     """
 
     tension: np.ndarray
@@ -52,7 +52,7 @@ class Discrete:
         end: at their ends.
         n_faces: number of half-planes that bound tensions.
         ends: x at the start and at the end.
-        largest: x that is taken to be larger than any.
+        largest: upper bound of all x.
     """
 
     section: Section
@@ -135,7 +135,7 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
 
 
 def _steepness(curve: Spline) -> tuple[float, float]:
-    # Lengths of the path a unit of s, at both ends.
+    # Lengths of the path per unit of s, at both ends.
     points, knots = np.asarray(curve.position), np.asarray(curve.knots)
     steps = (points[0, 1] - points[0, 0], knots[1] - knots[0]), (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2])
     first, last = ((points.shape[1] - 1) * float(np.linalg.norm(step)) / float(width) for step, width in steps)

@@ -41,17 +41,17 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 64
-# Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
+# The bound is lowered by this fraction of the sums, which is more than their rounding errors.
 SAFE = 1e-10
-# Times that multipliers are repaired; cells on each side of one from which it takes what it lacks, and by how much
-# more.
-REPAIRS, SPREAD, SPARE = 12, 20, 1.5
-# Axis of forces along gravity; by what more than is lacking weight is added.
-DOWN, MORE = 2, 1.01
+REPAIRS = 12  # rounds in which multipliers are repaired
+SPREAD = 20  # cells on each side whose multipliers change for one that lacks decrease
+SPARE = 1.5  # how much they change together, over the missing decrease
+DOWN = 2  # axis of forces along gravity
+MORE = 1.01  # how much weight is added, over what is lacking
 
 
 class Multipliers(NamedTuple):
-    """Multipliers at nodes, linear between them, a metre of path.
+    """Multipliers at nodes, linear between them, per metre of path.
 
     Fields:
         wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
@@ -65,11 +65,11 @@ class Multipliers(NamedTuple):
 
 
 class SpeedMultipliers(NamedTuple):
-    """Multipliers of squared speeds, one a cell, a metre of path; none is negative.
+    """Multipliers of squared speeds, one per cell, per metre of path; none is negative.
 
     Fields:
         cable: (n_cells, n_cables) s^3 / m^2.
-        mass_centre: (n_cells,) likewise; of no account where its speed is not limited.
+        mass_centre: (n_cells,) likewise; unused where its speed is not limited.
     """
 
     cable: np.ndarray
@@ -112,7 +112,7 @@ def lower_bound(
 
 
 def _with_weight(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
-    # With a part of weight in y, no product with a cable without a largest tension is positive.
+    # With enough weight added to y, no cable without a largest tension has a positive product with it.
     wrench = multipliers.wrench.copy()
     lacks = MORE * np.fmax(lacks, 0.0)
     wrench[:, PATTERNS[robot.pattern].forces.index(DOWN)] += np.fmax(np.append(lacks, 0.0), np.insert(lacks, 0, 0.0))
@@ -120,7 +120,7 @@ def _with_weight(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -
 
 
 def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
-    # [y . a x / 2], of all that is of the form of the wrench balance.
+    # [y . a x / 2] for the wrench balance, the cables' accelerations and the Cartesian one.
     total = 0.0
     for node, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
         if x > 0.0:
@@ -136,7 +136,7 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
 
 
 def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
-    # Let y fall more along a where it changes so fast that y . a' - y' . a is negative, and less in cells beside.
+    # Let y decrease more along a in cells where y . a' - y' . a is negative, and less in cells beside them.
     nodes = np.arange(len(short) + 1)
     fraction = np.zeros(len(nodes))
     for cell in np.flatnonzero(short > 0.0):
@@ -161,13 +161,13 @@ def _line(start: Array, end: Array) -> AffineBounds:
 
 
 def _line_rate(start: Array, end: Array, width: Array) -> AffineBounds:
-    # The derivative of the line between both.
+    # The derivative of the line between both values.
     change = (end - start) / width
     return AffineBounds(change, jnp.zeros_like(change), ROUNDING * jnp.abs(change))
 
 
 def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
-    # Values at both ends of the line below (-1), or above (1), a function.
+    # Values at both ends of a line that bounds a function from below (-1) or above (1).
     side = bounds.middle + sign * bounds.radius
     return side - bounds.linear, side + bounds.linear
 

@@ -1,4 +1,4 @@
-"""Interior-point method for a convex objective with many linear constraints, whose matrix its problem solves itself.
+"""Interior-point method for a convex objective with many linear constraints; the problem solves for the steps.
 
 A primal-dual method that needs no feasible start: slacks and multipliers of all constraints stay positive,
 and the products of both fall together (Mehrotra 1992).
@@ -8,11 +8,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-# Steps at most; part of the objective by which the optimum may be missed; part of the distance to a bound that a step
-# goes; part of the mean product of slacks and multipliers at which each step aims.
-STEPS, GAP, FRACTION, AIM = 120, 1e-7, 0.99, 0.1
-# By how much constraints and equations may be missed, in their scales.
-MISSED, LEVEL = 1e-9, 1e-6
+STEPS = 120  # at most
+GAP = 1e-7  # largest duality gap at an optimum, over the objective
+FRACTION = 0.99  # of the distance to a bound that a step may go
+AIM = 0.1  # mean product of slacks and multipliers at which a step aims, over the current one
+MISSED, LEVEL = 1e-9, 1e-6  # largest residuals of constraints and of equations at an optimum
 
 
 class Constrained(Protocol):
@@ -57,7 +57,7 @@ class Constrained(Protocol):
         """
 
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
-        """Step that the Hessian, with weighted squares of the slacks' gradients, turns into a right-hand side.
+        """Solution of (H + J^T W J) step = right, with the Hessian H, the Jacobian J of the slacks, and weights W.
 
         Args:
             z: unknowns.
@@ -112,7 +112,7 @@ def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
         change = target / slacks - multipliers + weights * missed
         try:
             step = problem.solved(z, weights, -residual - problem.jt_multipliers(z, change))
-        except np.linalg.LinAlgError:  # of cells whose widths differ beyond all digits
+        except np.linalg.LinAlgError:  # widths of cells can differ too much for double precision
             break
         slack_step = problem.change(z, step) - missed
         multiplier_step = target / slacks - multipliers - weights * slack_step

@@ -15,9 +15,9 @@ from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
 from cspr_jax.numerics.batches import device_batch_size, padded
 from cspr_jax.numerics.shapes import Float
 
-# Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
-TOGETHER, REPEATS = 32, 2
-# Width of a cell over that of all below which u changes within it as a guess says.
+TOGETHER = 32  # sections that are solved at a time, unless there is only one
+REPEATS = 2  # how often changes of u within cells are taken from a solution
+# Width of a cell, over the mean one, below which the change of u within it is that of a given motion.
 NARROW = 0.5
 
 
@@ -86,7 +86,7 @@ def run_of(solution: GridSolution, path: Discrete, u_rate: Float[np.ndarray, "n_
 def jumping_motions(paths: Sequence[Discrete], guesses: Sequence[PathAccelerations | None] = ()) -> list[Jumping]:
     """The fastest motions along sections.
 
-    Within cells u changes as it does from cell to cell, where there is a motion that does.
+    Within cells u changes at the rate at which it changes from cell to cell, if such a motion exists.
     """
     u_rates = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, u_rates)
@@ -118,7 +118,7 @@ def _is_passable(solution: GridSolution) -> bool:
 
 
 def _changes(solution: GridSolution, width: np.ndarray, guessed: np.ndarray | None) -> np.ndarray:
-    # In cells that are narrow since the path all but turns back there, u changes as is given.
+    # Cells are narrow where the path nearly turns back: there u changes at the given rate.
     change = minmod_rates(np.asarray(solution.u), width)
     return change if guessed is None else np.where(width < NARROW * width.mean(), guessed, change)
 

@@ -21,16 +21,14 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.runtime.stages import within
 
-# Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
-ROUNDS, SHORTER = 8, 4
+ROUNDS = 8  # of proof and tightening
+SHORTER = 4  # how often ramps are halved where no motion with them exists
 # Speed of a motion that counts as slow, over that of a fall along the path.
 SLOW = 0.01
-# How many times as fine grids are for motions that are not proved, and for lower bounds that are further below the
-# duration than this part of it.
-FINER, FAR = (2, 4), 0.002
-# Fractions of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
-# at the one before.
-STARTS, TANGENTS = (0.8, 0.4), 3
+FINER = (2, 4)  # factors by which grids become finer where a motion is not proved, or its lower bound is far
+FAR = 0.002  # gap between duration and lower bound, over the duration, above which the bound is far
+STARTS = (0.8, 0.4)  # fractions of x of the motion without ramps from which the search for one with ramps begins
+TANGENTS = 3  # optima, each with tangents at the one before
 # Sections that are solved together.
 TOGETHER = 64
 
@@ -67,7 +65,7 @@ class LeastTime:
         ramp_time: of the motion, s; 0 where its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.
         names: of the criteria that can bind.
-        binds: (n_cells,) number of the one that binds in each cell; -1: none.
+        binds: (n_cells,) index of the one that binds in each cell; -1: none.
         feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
         plane: path speeds.
         failure: why there is no motion, or None.
@@ -97,7 +95,7 @@ def least_time_motion(
 def least_times_along(
     problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
 ) -> Iterator[LeastTime]:
-    """Find the fastest motions along sections, however many, and announce how far that is."""
+    """Find the fastest motions along sections, part by part, and announce the progress."""
     count, progress = len(sections), RateEstimate()
     for first in range(0, count, batch):
         progress.advance(first, count)

@@ -16,15 +16,14 @@ from scipy.linalg import solveh_banded
 from cspr_jax.families.paths.least_time.interior_point import interior_point
 from cspr_jax.numerics.shapes import Float
 
-# Fractions of the x of a motion from which the search begins, one after the other: next to limits it may come to a
-# halt.
+# Fractions of the x of a motion from which the search begins, tried one after the other: near limits it may get stuck.
 STARTS = (0.8, 0.4, 1.0)
 
 
 class SideHalfPlanes(NamedTuple):
     """Half-planes at the nodes, u_coefficient u + x_coefficient x <= bound, and caps of the cells.
 
-    Where both sides of a node differ, those of both are there.
+    Where both sides of a node differ, it has the half-planes of both.
 
     Fields:
         u: (n_rows, n_nodes).

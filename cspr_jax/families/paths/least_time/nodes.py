@@ -1,4 +1,4 @@
-"""Nodes of a section of a path: between them the path acceleration is sought, and at both sides of them half-planes."""
+"""Nodes of a section of a path, and the half-planes that limits make of path speed and acceleration on both sides."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-# Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
-RAMP, SMALLER = 0.25, 5
-# Points that are computed together, of one section and of several. Pieces are raised to one degree, so that all
-# sections share what is compiled.
-BATCH, MANY, DEGREE = 64, 512, 5
+RAMP = 0.25  # fraction of the nodes over which cells become wider, from an end at zero speed on
+SMALLER = 5  # cells beside such an end that are narrower still
+BATCH, MANY = 64, 512  # points computed at a time, of one section and of many
+DEGREE = 5  # of all pieces: those of a lower degree are raised, so that all sections share what is compiled
 # A node that is nearer to the end of a piece than this part of its width lies there.
 NEAR = 1e-9
 
@@ -37,7 +36,7 @@ class PathGrid(NamedTuple):
         nodes: (n_cells + 1,) path coordinates, m; there is one at each knot of the section, and where accelerations or
             speed limits jump.
         speed: (n_cells,) largest speed of the mass centre in each cell, m/s, inf for none.
-        feed: (n_cells,) the same where the section itself has it, and not the limits of the robot.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf where the robot's limit is lower.
     """
 
     nodes: np.ndarray
@@ -56,9 +55,9 @@ class PathPoints(NamedTuple):
     Fields:
         position: (k, 6, 3) Bernstein coefficients of their pieces, m.
         quaternion: (k, 6, 4) likewise; None for a point mass.
-        fraction: (k,) of the piece before the point.
+        fraction: (k,) position of the point in its piece, from 0 to 1.
         width: (k,) of the pieces, m.
-        offset: (k, 3) as of `Spline`, or None.
+        offset: (k, 3) as in `Spline`, or None.
     """
 
     position: Any
@@ -99,7 +98,7 @@ def _fractions(count: int, slow: tuple[bool, bool]) -> np.ndarray:
 
 
 def _distance_at(time: np.ndarray, slow: tuple[bool, bool]) -> np.ndarray:
-    # Distance of a motion that speeds up over a part of its time, and slows down over as long, where it has to.
+    # Distance of a motion whose speed rises during a fraction of its time from a slow end, and falls towards one.
     before, after = (RAMP if end else 0.0 for end in slow)
     distance, left = time - 0.5 * before, 1.0 - time
     total = 1.0 - 0.5 * before - 0.5 * after
@@ -148,7 +147,7 @@ def side_half_planes(
     """Half-planes at the starts and at the ends of the cells of several sections."""
     points, speeds, jumps_of_grids = [], [], []
     for curve, grid in zip(curves, grids, strict=True):
-        # One computation is enough for both sides of a node, but where something jumps.
+        # One computation is enough for both sides of a node, except where something jumps.
         jumps = np.flatnonzero(np.isin(grid.nodes, curve.jumps()) | np.pad(grid.speed[1:] != grid.speed[:-1], 1))
         points += [
             points_on(curve, grid.nodes[:-1], ahead=True),
@@ -172,7 +171,7 @@ def side_half_planes(
 
 
 def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarray:
-    # Values at the ends of cells: those at the next starts, but where they jump, and at the last node.
+    # Values at the ends of cells: those at the starts of the next cells, except where they jump, and at the last node.
     end = np.concatenate([start[1:], before[-1:]])
     end[jumps - 1] = before[:-1]
     return end

@@ -1,9 +1,9 @@
-"""Least time along a path with a path acceleration that is continuous, and whose changes take their time.
+"""Least time along a path with a continuous path acceleration, whose rate of change (the path jerk) is limited.
 
 Between nodes u = s'' changes at a constant rate along the path, so that x = s'^2 is quadratic there. The time is a
 convex function of x, and the half-planes at the nodes are linear in u and x (Verscheure et al. 2009): an interior-point
-method finds the optimum, with a banded matrix a step. The limit |du/ds| sqrt(x) <= J of the path jerk is not convex; it
-is replaced by its tangents at an earlier motion, which lie inside, and the optimum is that of the next tangents.
+method finds the optimum, with one banded matrix for each step. The limit |du/ds| sqrt(x) <= J of the path jerk is not
+convex; it is replaced by tangents at an earlier motion, which are stricter, and the optimum gives new tangents.
 
 From rest and to rest, s is the cube of time over the first and the last cell: a constant jerk.
 """
@@ -18,12 +18,14 @@ from scipy.linalg import solve_banded
 from cspr_jax.families.paths.least_time.interior_point import interior_point
 from cspr_jax.numerics.shapes import Float
 
-# Diagonals below and above the main one, with three unknowns a node; what keeps the matrix regular; smallest x over the
-# largest from which the search starts.
-BANDWIDTH, REGULAR, SMALLEST = 4, 1e-14, 1e-12
-# Half-planes of each side that count about a motion, at its x and at a fraction of it; whose coefficient of u is no
-# smaller; by how much others may be missed; how often these are added.
-NEAREST, SLOWER, FLAT, MISSED, MORE_ROWS = 6, 0.8, 1e-12, 1e-9, 4
+BANDWIDTH = 4  # diagonals below and above the main one, with three unknowns for each node
+REGULAR = 1e-14  # added to the diagonal, so that the matrix is regular
+SMALLEST = 1e-12  # smallest x from which the search starts, over the largest
+# The half-planes nearest to a motion replace all, so many on each side of u, both at its x and at a fraction of its x.
+NEAREST, SLOWER = 6, 0.8
+FLAT = 1e-12  # a half-plane with a smaller coefficient of u bounds x alone
+MISSED = 1e-9  # by which other half-planes may be broken
+MORE_ROWS = 4  # times that broken ones are added
 
 
 class SectionEnds(NamedTuple):
@@ -39,7 +41,7 @@ class SectionEnds(NamedTuple):
 
 
 class NodeHalfPlanes(NamedTuple):
-    """Half-planes at the nodes, as of `constraints.HalfPlanes`, and x <= cap.
+    """Half-planes at the nodes, as in `constraints.HalfPlanes`, and x <= cap.
 
     Fields:
         u: (n_rows, n_nodes).
@@ -101,16 +103,16 @@ class Smooth(NamedTuple):
     u: np.ndarray
 
 
-def smooth(half_planes: NodeHalfPlanes, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
+def smooth(half_planes: NodeHalfPlanes, ends: SectionEnds, start: Smooth, jerk: float, tries: int = 1) -> Smooth | None:
     """Least time with a continuous path acceleration."""
     near, motion = half_planes.nearest(start.x), start
-    for time in range(times + MORE_ROWS):
+    for k in range(tries + MORE_ROWS):
         problem = _Problem(near, ends, jerk, motion.x)
         z, _, is_optimal = interior_point(problem, problem.start(motion))
         if not is_optimal:
             return None
         motion = Smooth(z[:, 0], z[:, 1])
-        if time >= times - 1:
+        if k >= tries - 1:
             if (half_planes.bound - half_planes.u * motion.u - half_planes.x * motion.x).min() > -MISSED:
                 return motion
             near = near.beside(half_planes.nearest(motion.x))
@@ -155,19 +157,19 @@ def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
 
 
 class _Tangents(NamedTuple):
-    # Tangents of the limit of the path jerk: +-(u1 - u0) fraction + (x0 + x1) level <= 1, (n_cells,).
-    fraction: np.ndarray
-    level: np.ndarray
+    # Tangents of the limit of the path jerk: +-(u1 - u0) of_u + (x0 + x1) of_x <= 1, (n_cells,).
+    of_u: np.ndarray
+    of_x: np.ndarray
 
 
 def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, bool]) -> _Tangents:
     middle = 0.5 * (x[1:] + x[:-1])
     # 1 / sqrt x is above its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
-    fraction, level = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
+    of_u, of_x = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
     for end, rest in zip((0, -1), rests, strict=True):
         if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
-            fraction[end], level[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
-    return _Tangents(fraction, level)
+            of_u[end], of_x[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
+    return _Tangents(of_u, of_x)
 
 
 class _Problem:
@@ -206,7 +208,7 @@ class _Problem:
         return np.concatenate([slacks.ravel(), *(-side for side in self._tangent_values(step))])
 
     def _tangent_values(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        change, total = self.tangents.fraction * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
+        change, total = self.tangents.of_u * np.diff(z[:, 1]), self.tangents.of_x * (z[1:, 0] + z[:-1, 0])
         return total + change, total - change
 
     def jt_multipliers(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
@@ -214,7 +216,7 @@ class _Problem:
         gradient = np.zeros_like(z)
         gradient[:, 0], gradient[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
         up, down = multipliers[self.u.size :].reshape(2, -1)
-        total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.fraction
+        total, difference = (up + down) * self.tangents.of_x, (up - down) * self.tangents.of_u
         gradient[:-1, 0] += total
         gradient[1:, 0] += total
         gradient[:-1, 1] -= difference
@@ -233,37 +235,37 @@ class _Problem:
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
         # Matrix of neighbouring nodes: (row, column) of one node, and (row of one, column of the next).
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
-        current, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
+        diagonal, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
-        current[0, 0] = time.hessian + np.sum(of_rows * self.x**2, axis=0)
-        current[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
-        current[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
+        diagonal[0, 0] = time.hessian + np.sum(of_rows * self.x**2, axis=0)
+        diagonal[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
+        diagonal[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
         ahead[0, 0] = time.coupling
         up, down = weights[self.u.size :].reshape(2, -1)
-        fraction, level = self.tangents
-        of_level, of_share, mixed = (up + down) * level**2, (up + down) * fraction**2, (up - down) * level * fraction
+        of_u, of_x = self.tangents
+        x_squares, u_squares, mixed = (up + down) * of_x**2, (up + down) * of_u**2, (up - down) * of_x * of_u
         for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
-            current[0, 0, near] += of_level
-            current[1, 1, near] += of_share
-            current[0, 1, near] += sign * mixed
-        ahead[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
-        current[1, 0] = current[0, 1]
-        current[2, :2, :-1] = current[:2, 2, :-1] = self.cells[0]
-        current[2, 2, -1] = 1.0
+            diagonal[0, 0, near] += x_squares
+            diagonal[1, 1, near] += u_squares
+            diagonal[0, 1, near] += sign * mixed
+        ahead[:2, :2] += np.array([[x_squares, mixed], [-mixed, -u_squares]])
+        diagonal[1, 0] = diagonal[0, 1]
+        diagonal[2, :2, :-1] = diagonal[:2, 2, :-1] = self.cells[0]
+        diagonal[2, 2, -1] = 1.0
         ahead[2, :2] = self.cells[1]
         return solve_banded(
-            (BANDWIDTH, BANDWIDTH), self._banded(current, ahead), right.ravel(), check_finite=False
+            (BANDWIDTH, BANDWIDTH), self._banded(diagonal, ahead), right.ravel(), check_finite=False
         ).reshape(z.shape)
 
-    def _banded(self, current: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    def _banded(self, diagonal: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         # Banded matrix as SciPy takes it: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
         free = self.free.T
-        current = np.where(free[:, None] & free[None], current, np.eye(3)[:, :, None])
+        diagonal = np.where(free[:, None] & free[None], diagonal, np.eye(3)[:, :, None])
         ahead = np.where(free[:, None, :-1] & free[None, :, 1:], ahead, 0.0)
-        banded = np.zeros((2 * BANDWIDTH + 1, current.shape[2], 3))
+        banded = np.zeros((2 * BANDWIDTH + 1, diagonal.shape[2], 3))
         for row in range(3):
             for column in range(3):
-                banded[BANDWIDTH + row - column, :, column] += current[row, column]
+                banded[BANDWIDTH + row - column, :, column] += diagonal[row, column]
                 if column < 2:  # nothing depends on the multiplier of the cell after next
                     banded[BANDWIDTH + row - column - 3, 1:, column] += ahead[row, column]
                     banded[BANDWIDTH + column + 3 - row, :-1, row] += ahead[row, column]

@@ -10,8 +10,8 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 
-# Part of the weight by which tensions miss their limits at least, and digits of numbers in words.
-MISSED, DIGITS = 1e-9, 4
+MISSED = 1e-9  # over the weight, by which tensions must miss their limits
+DIGITS = 4  # of numbers in words
 
 
 class StaticTension(NamedTuple):
@@ -45,7 +45,7 @@ class StaticTension(NamedTuple):
 
 
 def static_tension(problem: Problem, state: State) -> StaticTension | None:
-    """The tension that misses its limits by most at rest, where all tensions together miss them by least."""
+    """The tension with the largest violation at rest, among tensions whose largest violation is smallest."""
     robot = problem.robot
     wrenches, count = unit_wrenches(robot, state), robot.n_cables
     low, high = (np.broadcast_to(side, count) for side in tension_range(robot, problem.limits))

@@ -20,10 +20,10 @@ from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.piece_slacks import Sides, close_bounds
 from cspr_jax.verification.proved_answers import TENSIONS
 
-# Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
-# much at least, margins grow; below which a criterion binds.
-LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
-# Cells on each side in which margins grow with those of a cell, after the first time: one for so many of the grid.
+LEFT = 1e-7  # slack over its scale that counts as met
+MORE, STEP = 1.3, 1e-5  # how much margins grow, over what is missed, and at least
+BINDING = 0.01  # slack over its scale below which a criterion binds
+# After the first round, margins also grow in this fraction of the grid's cells on each side.
 SPREAD = 150
 # Times that a cell is halved.
 HALVINGS = 3
@@ -50,7 +50,7 @@ class BindingName(NamedTuple):
     Fields:
         criterion: name of its flag.
         cable: from 0 on; None: of no single cable.
-        feed: as G-code has it, such as "F6000"; "" of other criteria.
+        feed: in the words of G-code, such as "F6000"; "" for other criteria.
     """
 
     criterion: str
@@ -82,8 +82,8 @@ class CellSlacks(NamedTuple):
         return bool((self.low > 0.0).all())
 
     def grown(self, margins: GridMargins, weight: float) -> GridMargins:
-        """Margins with which what is missed will be met."""
-        # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
+        """Larger margins, with which criteria that are missed should be met."""
+        # Tightening one cell can move a violation to the next cell: let margins grow around it, too.
         radius = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
 
         def lacking(chosen: list[bool]) -> np.ndarray:

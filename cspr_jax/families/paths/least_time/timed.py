@@ -1,7 +1,7 @@
 """Motion along a path in time: quintic pieces through positions, velocities and accelerations at the nodes.
 
-The motion that controllers play, and that is proved, is this one. It meets the path at the nodes; between them it is
-off by what a quintic piece misses, which is returned.
+Controllers play this motion, and this one is proved. It meets the path at the nodes; `distance_from_path` says how far
+it leaves the path between them.
 """
 
 from __future__ import annotations

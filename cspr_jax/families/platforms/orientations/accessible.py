@@ -2,7 +2,7 @@
 
 "grid": the multiples of the step of tilt and torsion that chains of neighbours join to the reference orientation.
 "scan": Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of
-equal volume of SO(3); only here is the number of orientations proportional to a volume.
+equal volume of SO(3); only by this definition is the number of orientations proportional to a volume.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
-# Steps along rays that are tried at a time: few rays go farther, and with the usual number of rays these steps fill
+# Steps along a ray that are tried at a time: few rays are longer, and with the usual number of rays these steps fill
 # three batches of `OrientationSteps`.
 RAY_STEPS = 23
 SO3_VOLUME = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma

@@ -20,9 +20,10 @@ from cspr_jax.robots.statics.symmetries import NONE, Symmetries, alike
 VALUES = 20
 # The preferred value is tried first, then every fifth of the others, then the rest.
 FEWER = 5
-# Cases of a part, enough to fill batches: candidates of a search for the smallest numbers of arcs; motions of a
-# search that only tells whether there is one; and the stride by which the latter are mixed.
-LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
+# Cases of a part, enough to fill batches.
+LARGE = 4 * CANDIDATES  # candidates of a search for the smallest numbers of arcs
+PART = CANDIDATES // 4  # motions of a search that only tells whether there is one
+MIXED = 16  # stride by which orientations are spread over the parts of such a search
 
 
 def attainable(
@@ -78,7 +79,7 @@ def attained(
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 
-    # Positions differ in how long they take: each part gets some of all.
+    # Some positions take longer than others: each part gets orientations of all.
     mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
     flags = np.empty(len(representatives), bool)
     representatives[:] = representatives[mixed]

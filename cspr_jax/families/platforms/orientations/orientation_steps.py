@@ -31,9 +31,8 @@ from cspr_jax.robots.statics.wrench_balance import at_rest, determinant_ratio, i
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 
 BATCH = 512
-# Gaps between cables below this part of the platform's radius count as zero. A cable that makes a smaller angle with
-# the platform lies in it, and counts as on the side where it is in the reference orientation: it has not yet passed
-# over.
+# Gaps between cables below this fraction of the platform's radius count as zero. A cable that makes a smaller angle
+# with the platform lies in it, and counts as still on the side on which it is in the reference orientation.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -112,7 +111,9 @@ class OrientationSteps:
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_determinant(robot, self._position)
         self._radius = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
-        self._side = np.zeros(robot.n_cables)  # of each cable; not yet computed, and nothing lies in the platform there
+        self._side = np.zeros(
+            robot.n_cables
+        )  # of each cable in the reference orientation; 0 until it is computed below
         self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
     def at(self, quaternions: Float[np.ndarray, "n 4"]) -> OrientationSamples:

@@ -19,7 +19,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES, REFUSALS, TILT_TORSION
 from cspr_jax.schema.verdicts import FLAGS, NO_REASON, SENTENCES, Verdict
 
-# Digits of a position, m, up to which two cells are at the same one.
+# Decimals of a position, m, that are equal if two cells are at the same one.
 DIGITS = 12
 
 
@@ -162,7 +162,7 @@ class OrientationsMap(AttainabilityMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         positions, z0 = self._targets(cells), self._depths(cells)
-        # An axis of the file turned over turns phi and sigma around.
+        # If z points up in the file, phi and sigma change their signs.
         angles = self._frame.rotated_angles(np.stack([cells[name] for name in TILT_TORSION], axis=1))
         accessible_cells, count = np.flatnonzero(self._accessible(positions, angles) & (z0 > 0.0)), len(z0)
         results = {name: np.full(count, np.nan) for name in FLOATS}

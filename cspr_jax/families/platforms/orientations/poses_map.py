@@ -58,7 +58,7 @@ class PosesMap(PlatformMap):
         return pose_arcs(self._checker, motions, fixed=arcs, **how)
 
     def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
-        # Return the columns among obstacles, by which a motion is proved as its plan is.
+        # Return the columns among obstacles; motions are proved as those of a plan are.
         # Maps without obstacles need no proofs of any motion.
         from cspr_jax.verification.bounds.batch import MotionBatch
         from cspr_jax.verification.verifier import Verifier

@@ -36,14 +36,14 @@ from cspr_jax.workspaces.poses import exact
 from cspr_jax.workspaces.requirements import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Number of samples that are held at a time, and of samples of a motion that are screened at a time.
-MAX_SAMPLES, CHUNK = 200_000, 8
+MAX_SAMPLES = 200_000  # samples that are held at a time
+CHUNK = 8  # samples of a motion that are screened at a time
 # Samples an arc.
 SAMPLES = 32
 # A search looks for minima between samples where a smallest sample is below this part of the largest.
 NEAR = 0.1
-# Halvings of an interval of beta-hat, down to rounding. Derivatives below this part of the margins count as zero.
-HALVINGS, FLAT = 60, 1e-12
+HALVINGS = 60  # of an interval of beta-hat, down to rounding
+FLAT = 1e-12  # derivatives over margins that count as zero
 # An interval of no values.
 NONE = (LARGEST, -LARGEST)
 
@@ -142,7 +142,7 @@ class RedundantChecker(MotionChecker):
         self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Values of beta-hat to try at poses, that of the largest margin first; see `MotionChecker.end_options`."""
-        # It stays where no value is feasible, so that its motion can say what is wrong.
+        # It is kept where no value is feasible, so that its motion shows what fails.
         poses = zip(positions, quaternions, z0.tolist(), strict=True)
         ends = np.array([self.end_interval(*pose) for pose in poses]).reshape(-1, 3)
         values = options(ends[:, 0], ends[:, 1], ends[:, 2], count)

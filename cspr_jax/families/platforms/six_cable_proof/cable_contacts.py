@@ -26,32 +26,32 @@ class CablesOfStep(NamedTuple):
 
     Fields:
         rays: (m, n, n_cables, 3) from spool to platform, m.
-        seen: (m, n, n_cables, 3) from platform to spool in platform axes, m.
-        deviation: (n, n_cables) C h^2 / 8 of the rays, m.
-        seen_deviation: (n,) C h^2 / 8 of the cables as the platform sees them, m.
+        platform_rays: (m, n, n_cables, 3) from platform to spool in the axes of the platform, m.
+        deviation: (n, n_cables) C h^2 / 8 of `rays`, m.
+        platform_deviation: (n,) C h^2 / 8 of `platform_rays`, m.
     """
 
     rays: np.ndarray
-    seen: np.ndarray
+    platform_rays: np.ndarray
     deviation: np.ndarray
-    seen_deviation: np.ndarray
+    platform_deviation: np.ndarray
 
 
-class _Around(NamedTuple):
-    # Balls: centres (k, 3) and radii (k,) of the vectors within them.
-    mean: np.ndarray
-    off: np.ndarray
+class _Balls(NamedTuple):
+    # Balls that contain vectors.
+    center: np.ndarray  # (k, 3)
+    radius: np.ndarray  # (k,)
 
-    def cross(self, other: "_Around") -> "_Around":
-        return _Around(np.cross(self.mean, other.mean), self._product_off(other))
+    def cross(self, other: "_Balls") -> "_Balls":
+        return _Balls(np.cross(self.center, other.center), self._product_radius(other))
 
-    def dot(self, other: "_Around") -> tuple[np.ndarray, np.ndarray]:
+    def dot(self, other: "_Balls") -> tuple[np.ndarray, np.ndarray]:
         # Return the smallest and the largest product.
-        product, off = (self.mean * other.mean).sum(-1), self._product_off(other)
-        return product - off, product + off
+        product, radius = (self.center * other.center).sum(-1), self._product_radius(other)
+        return product - radius, product + radius
 
-    def _product_off(self, other: "_Around") -> np.ndarray:
-        return _norm(self.mean) * other.off + _norm(other.mean) * self.off + self.off * other.off
+    def _product_radius(self, other: "_Balls") -> np.ndarray:
+        return _norm(self.center) * other.radius + _norm(other.center) * self.radius + self.radius * other.radius
 
 
 def cables_meet(
@@ -66,7 +66,7 @@ def cables_meet(
     step, block, pair = _sign_changes(volume, _norm(spools) * (_norm(u) * _norm(v)).max(0))
     first = _within(cables.rays, (step, block, i[pair]), cables.deviation)
     second = _within(cables.rays, (step, block, j[pair]), cables.deviation)
-    between = _Around(spools[pair], np.zeros(len(pair)))
+    between = _Balls(spools[pair], np.zeros(len(pair)))
     normal = first.cross(second)
     minimum = normal.dot(normal)[0]
     inside = minimum > 0.0
@@ -82,14 +82,14 @@ def cables_hit(
     sides: Float[np.ndarray, "n_cables 2 3"], normal: Float[np.ndarray, "3"], cables: CablesOfStep
 ) -> Int[np.ndarray, "n"]:
     """Steps in which a cable lies on the platform for certain."""
-    hits = np.full(cables.seen.shape[1], -1)
-    step, block, cable = _sign_changes(cables.seen @ normal, _norm(cables.seen).max(0))
-    deviation = np.broadcast_to(cables.seen_deviation[:, None], cables.seen.shape[1:3])
-    seen = _within(cables.seen, (step, block, cable), deviation)
+    hits = np.full(cables.platform_rays.shape[1], -1)
+    step, block, cable = _sign_changes(cables.platform_rays @ normal, _norm(cables.platform_rays).max(0))
+    deviation = np.broadcast_to(cables.platform_deviation[:, None], cables.platform_rays.shape[1:3])
+    rays = _within(cables.platform_rays, (step, block, cable), deviation)
     one, two = sides[cable, 0], sides[cable, 1]
     # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
-    inside = np.cross(two, seen.mean) @ normal > _norm(two) * seen.off
-    inside &= np.cross(seen.mean, one) @ normal > _norm(one) * seen.off
+    inside = np.cross(two, rays.center) @ normal > _norm(two) * rays.radius
+    inside &= np.cross(rays.center, one) @ normal > _norm(one) * rays.radius
     inside |= (sides[cable] == 0.0).all((1, 2))  # the sector is all of the plane
     hits[block[inside]] = step[inside]
     return hits
@@ -101,11 +101,11 @@ def _sign_changes(values: np.ndarray, magnitudes: np.ndarray) -> tuple[np.ndarra
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
-def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], deviation: np.ndarray) -> _Around:
+def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], deviation: np.ndarray) -> _Balls:
     # Enclose vectors during the steps that begin at the given times.
     step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
-    return _Around(0.5 * (before + after), 0.5 * _norm(after - before) + deviation[block, cable])
+    return _Balls(0.5 * (before + after), 0.5 * _norm(after - before) + deviation[block, cable])
 
 
 def _norm(vectors: np.ndarray) -> np.ndarray:

@@ -43,11 +43,11 @@ from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
-# Largest number of blocks in a call, and of arcs that are held at a time.
-BLOCKS, ARCS = 1024, 32 * MANY
+BLOCKS = 1024  # in a call, at most
+ARCS = 32 * MANY  # of motions that are held at a time, at most
 # Samples that are computed together.
 SAMPLES = 1 << 18
-# With margins, the bound must reach this part of the attained value.
+# With margins, the bound must be at least this fraction of the attained value.
 NEAR = 0.5
 
 
@@ -208,7 +208,7 @@ class PlatformChecker(MotionChecker):
     def _apply_uncertainty(
         self, checks: PlatformChecks, indices: np.ndarray, motions: Motions, verdict: np.ndarray
     ) -> None:
-        # Judge motions that are feasible as planned by how much of the uncertainty they stand.
+        # Motions that are feasible as planned must also tolerate the uncertainty.
         feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(feasible):
             return

@@ -26,8 +26,8 @@ from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import polynomial, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
-# arccos(s) / sqrt(1 - s^2) is bounded up to this 1 - s, since it is singular at 2; and 1 - s counts as this at least.
-FARTHEST, NEAREST = 1.9, 0.1
+FARTHEST = 1.9  # largest 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2
+NEAREST = 0.1  # smaller values of 1 - s count as this one
 
 
 class Middle(NamedTuple):

@@ -9,9 +9,9 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Bool, Float, Int
 
-# Number of parabolas that follow one another, how much nearer the points of each are, and the spread of values below
-# which they are not narrowed down.
-ROUNDS, NEARER, LEVEL = 5, 3.0, 1e-9
+ROUNDS = 5  # parabolas, one after the other
+NEARER = 3.0  # ratio of the distances of the points of one and of the next
+LEVEL = 1e-9  # spread of values below which they are not narrowed down
 
 
 class Samples(NamedTuple):

@@ -35,7 +35,7 @@ from cspr_jax.schema.limits import Limit
 # Steps of a block, and the times at their ends, from -1 to 1.
 STEPS = 4
 OFFSETS = np.linspace(-1.0, 1.0, STEPS + 1)
-# Lengths and heights may be wrong by this part of the largest coordinate.
+# Rounding error of lengths and heights, over the largest coordinate.
 POSE_ERROR = 1e-13
 TINY = 1e-30
 
@@ -164,7 +164,7 @@ def _units(vectors: Vector) -> list[Vector]:
 def _separation(
     robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: CableLanes, deviations: _Deviations
 ) -> Array:
-    # Return the minimum over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
+    # Return the minimum over pairs of e . (x_j - x_i) at the ends of both cables, less the deviation between two times.
     if not pairs:
         return jnp.full_like(deviations.centre, jnp.inf)
     arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))

@@ -1,6 +1,6 @@
 """Proofs about contacts, depth and limits on the pose, which depend on a platform's pose alone.
 
-A motion is clear if all of its blocks are clear (`place_blocks`). It has a contact if two cables, or a cable and the
+A motion is clear if all of its blocks are clear (`pose_blocks`). It has a contact if two cables, or a cable and the
 platform, are proved to meet between two times (`cable_contacts`). Else, after many halvings, it is undecided.
 """
 
@@ -30,13 +30,14 @@ from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 
-# Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
-# where a platform moves fastest.
+# Blocks per arc to begin with, for margins.
 PARTS = 8
+# The same for verdicts alone, as in `tension_proof`: at cusps, and halfway between two cusps, where a platform moves
+# fastest.
 FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
-TOUCH = 1e-9  # nearer than this part of the platform's radius is undecided
-# After so many halvings contacts are searched for; and the times halfway between those of a block, from -1 to 1.
-NEAR_CONTACT = 5
+TOUCH = 1e-9  # distances below this fraction of the platform's radius are undecided
+NEAR_CONTACT = 5  # halvings of a block after which contacts are searched for
+# Times halfway between those of a block, from -1 to 1.
 MIDDLES = 0.5 * (OFFSETS[1:] + OFFSETS[:-1])
 
 
@@ -169,6 +170,6 @@ class PoseCertifier:
             blocks.times(OFFSETS[:, None]).ravel() - middle,
         )
         vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, batch_size=self._batch)
-        rays, seen = (x.reshape(len(OFFSETS), len(blocks.row), *x.shape[1:]) for x in vectors)
+        rays, platform_rays = (x.reshape(len(OFFSETS), len(blocks.row), *x.shape[1:]) for x in vectors)
         centre, arm, platform = deviations
-        return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)
+        return CablesOfStep(rays, platform_rays, centre[:, None] + arm[:, None] * self._arms, platform)

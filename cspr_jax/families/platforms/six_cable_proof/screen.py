@@ -29,9 +29,9 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import balance, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-# Samples of one call; how many times more motions are screened than checked at a time; and the part of a batch up to
-# which motions count as few.
-CHUNK, FIRST, FEWER = 8, 2, 8
+CHUNK = 8  # samples of one call
+FIRST = 2  # motions screened at a time, over those checked at a time
+FEWER = 8  # divisor of a batch: up to so many motions count as few
 
 
 @persistent_jit(static_argnames=("kind", "single_precision"))
@@ -130,7 +130,7 @@ class TensionScreen(NamedTuple):
         robot: the robot.
         amplitude: A.
         kind: of the motions.
-        threshold: tension that refutes, as any smaller one does.
+        threshold: largest tension that refutes.
         batch: how many motions are computed in one call.
         count_samples: called with the number of samples that were computed.
     """

@@ -67,8 +67,9 @@ def pose_slacks(
     return jnp.stack([*basic, *(jnp.min(x) for x in slacks)])
 
 
-# No tension is given below this volume of three of the cables over the product of their lengths: they lie nearly in one
-# plane, and the rounding of the fast balance grows with the third power of the inverse volume. It must refute nothing.
+# Below this volume of three of the cables over the product of their lengths they lie nearly in one plane, and the
+# rounding of the fast balance grows with the third power of the inverse volume: then it gives no tension, so that it
+# refutes nothing.
 FLAT = 1e-3
 
 

@@ -52,8 +52,8 @@ from cspr_jax.robots.statics.wrench_lanes import CABLES, balance, cable_lanes, i
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 
-# A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
-# constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
+# Rounding error of a value at a node over its bound on real time (tests find a tenth of that); Lebesgue's constant
+# multiplies it for the polynomial through such values, and Bernstein coefficients add a fraction of the values.
 NODE_ERROR = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
 REGULAR = CABLES  # index of D among the values

@@ -48,7 +48,7 @@ from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
-MATTERS = 0.1  # part of the whole allowance from which rounding matters
+MATTERS = 0.1  # fraction of the total allowance from which rounding matters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Certifier:
     def _prove_again(
         self, proof: TensionProof, segments: PlatformSegment, arcs: np.ndarray, stuck: np.ndarray, ignored
     ) -> None:
-        # Values in single precision do not decide limits that are nearly touched: prove these with all nodes.
+        # Without all nodes, values are in single precision, which cannot decide limits that are nearly touched.
         is_near = (proof.attained[stuck][:, self._is_limit] < SIX_CABLES_UNDECIDED).any(1)
         is_near &= (proof.attained[stuck][:, ~self._is_limit] > SIX_CABLES_UNDECIDED).all(1)
         if is_near.any():

@@ -15,11 +15,11 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.verification.bounds.blocks import Blocks
 
-# Slacks of limits nearer to zero are undecided, where double precision bounds them.
+# Slacks of limits that are nearer to zero than this are undecided, if they are bounded in double precision.
 LIMITS_UNDECIDED = 1e-12
-# A block is halved so many times at most, and so many blocks of an arc may be open.
-HALVINGS, OPEN = 21, 64
-# How many times more blocks may be open where nothing is missed by more than other criteria are undecided.
+HALVINGS = 21  # of a block, at most
+OPEN = 64  # blocks of an arc that may be open
+# Factor of `OPEN` for motions that break no criterion by more than the undecided range.
 TOUCHING = 64
 # How many times blocks are halved at once: in the first round, in the second, and in all later ones, where few blocks
 # are open and a batch of them costs as much as a full one.
@@ -48,7 +48,7 @@ class WorkList:
 
     Args:
         arcs: (n,) numbers of arcs.
-        near: (n_criteria,) how near to zero slacks are undecided.
+        near: (n_criteria,) distance from zero within which slacks are undecided.
         ignored: (n_criteria,) mask of criteria that neither refute nor need be proved; None: all count.
 
     Fields:

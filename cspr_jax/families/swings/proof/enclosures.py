@@ -22,7 +22,7 @@ from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates,
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
-PARTS = 4  # of an arc, to begin with
+PARTS = 4  # blocks of an arc to begin with
 BATCH = 1024  # blocks computed at a time
 
 

@@ -50,7 +50,7 @@ class LimitScreen:
         self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
 
     def screened(self, rows: Int[np.ndarray, "m"]) -> Int[np.ndarray, "k"]:
-        """Screen candidates until none that comes first is refuted."""
+        """Screen candidates until the first one left of each segment has passed; return the segments that have one."""
         while True:
             rows = rows[self.alive[rows].any(1)]
             open_rows = rows[self._unseen[rows, np.argmax(self.alive[rows], axis=1)]]
@@ -78,7 +78,7 @@ def broken_at_samples(
 def upcoming(
     candidates: Bool[np.ndarray, "n max_arcs"], rows: Int[np.ndarray, "m"]
 ) -> tuple[Num[np.ndarray, "k"], Num[np.ndarray, "k"]]:
-    """Next candidates of segments: one each, or as many as fit into a batch, which takes as long whatever it holds."""
+    """Next candidates of segments: one each, or as many as fill a batch, which takes no longer when it is full."""
     left = candidates[rows]
     owner, column = np.nonzero(left & (np.cumsum(left, axis=1) <= max(BATCH // len(rows), 1)))
     return rows[owner], column + 1

@@ -27,7 +27,7 @@ from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 CANDIDATES = 3
-# An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
+# The last 16 bits of an estimate hold its time, to 1/4096 of the distance of samples; no estimate is larger than this.
 LAST_BITS = 2**16 - 1
 LARGEST = 1e300
 # Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
@@ -41,8 +41,8 @@ def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array,
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     sampled = partial(jax.vmap(jax.vmap(partial(function, *problem)), in_axes=(None, None, 0)), segments, arcs)
-    # A parabola through every three neighbours: the lowest sample may be of the valley of another block. Of parts of
-    # computed arrays XLA would compute each anew, with all that several functions share.
+    # A parabola through every three neighbours: the lowest sample may belong to the valley of another block. XLA would
+    # compute parts of computed arrays anew each time, with all that several functions share.
     each = map(vertex, sampled(tau[:-2]), sampled(tau[1:-1]), sampled(tau[2:]))
     marked = smallest_of_each([_marked(estimate, weight[1:-1] + move / INTERVALS) for move, estimate in each])
     estimates, fractions = _unmarked(jnp.stack(marked))
@@ -63,8 +63,8 @@ def _unmarked(marked: Array) -> tuple[Array, Array]:
 
 
 def _insert(best: tuple[Array, Array], estimate: Array, at: Array) -> tuple[Array, Array]:
-    # Keep the candidates in order, the new one in order; leaves (CANDIDATES, n_values, n). A segment with fewer
-    # blocks than others sees its last block again: a time that is there is not new.
+    # Insert a candidate so that all stay in order; leaves (CANDIDATES, n_values, n). Segments with fewer blocks than
+    # others repeat their last block: a time that is among the candidates is not inserted again.
     estimate = jnp.where((best[1] == at[None]).any(0), jnp.inf, estimate)
     estimates, times = [], []
     for old_estimate, old_at in zip(*best, strict=True):
@@ -207,5 +207,5 @@ def each_margin(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"])
     table = blocks(problem.amplitude, int(np.max(arcs)))
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)
-    # A compiled minimum may pass over NaN; a function without a finite minimum has none.
+    # A compiled minimum may ignore NaN; a function that is not finite everywhere has no minimum.
     return np.where(np.isfinite(smallest), smallest, np.nan)

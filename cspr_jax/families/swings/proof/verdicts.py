@@ -37,8 +37,7 @@ from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 1024
-# Length of the batches of few segments: with limits, for which a full batch would take several times as long, and of
-# plans.
+# Lengths of batches for few segments: with limits, where a full batch takes several times as long, and in plans.
 SMALL = 128
 OF_PLANS = 16  # segments that plans have, at most
 FINEST_CUT = 12

@@ -56,9 +56,9 @@ def _squared(omega: Array, end: Array) -> Array:
 def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
     # Return the largest root Omega of the envelope, for A, A', A'' at one time.
     value, rate, second_derivative = values
-    c, swung = second_derivative - value * end, inclination * value
-    d = (1.0 - swung) * (1.0 + swung)
-    half = swung * load * c - 2.0 * (load * rate) ** 2
+    c, tilt = second_derivative - value * end, inclination * value
+    d = (1.0 - tilt) * (1.0 + tilt)
+    half = tilt * load * c - 2.0 * (load * rate) ** 2
     rest = load**2 * (c**2 + 4.0 * end * rate**2)
     squared = half**2 + d * rest
     root = jnp.sqrt(jnp.maximum(squared, 0.0))

@@ -69,7 +69,7 @@ def proved_envelope(
     """Lower bound of all pseudotensions, and of the depth below the spools over z0, on a full transition."""
     end = derivatives(amplitude, jnp.ones_like(n), order=2)[2]
     omega = (2.0 * math.pi * n) ** 2 - end
-    # The squares are convex in the load: no load between these, the depth's 0 among them, has a lower envelope.
+    # The squares are convex in the load: no load between these, such as 0 for the depth, has a lower envelope.
     loads = jnp.stack(
         [jnp.maximum(jnp.max(weights) + inclination, 0.0), jnp.minimum(jnp.min(weights) + inclination, 0.0)]
     )

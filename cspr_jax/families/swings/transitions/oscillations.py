@@ -106,9 +106,9 @@ def best_inclinations(
 def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     def one(weights, v):
         inside = jnp.abs(v) < 1.0
-        current = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
-        current = jnp.where(inside & jnp.isfinite(current), current, jnp.nan)
-        return current, counts.horizontal_oscillations(amplitude, weights) - current
+        needed = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
+        needed = jnp.where(inside & jnp.isfinite(needed), needed, jnp.nan)
+        return needed, counts.horizontal_oscillations(amplitude, weights) - needed
 
     return jax.vmap(one)(*arguments)
 
@@ -117,8 +117,8 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     # Horizontal transitions take a third of the work.
     weights, _ = arguments
-    current = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
-    return current, jnp.zeros_like(current)
+    needed = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
+    return needed, jnp.zeros_like(needed)
 
 
 @partial(jax.jit, static_argnames="largest")

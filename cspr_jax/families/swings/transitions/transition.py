@@ -1,12 +1,12 @@
 """Transitions between rest and a point beyond the static workspace, thesis chapter 1, in the product's axes.
 
-The effector swings about p0 on the straight line through the target, in n oscillations whose size
-grows like the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the
+The effector swings about p0 on the straight line through the target, in n oscillations that grow
+like the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the
 duration (1.29) its end acceleration is that of a pendulum hung from the centroid of the spools.
 
-It is a segment of chapter 2 from rest with an even number of arcs p = 2 n, but for A''(1), which
-need not vanish here. Backwards in time it is the way back to rest, (1.56) to (1.58). At constant
-size it is a swing that stays between the target and its opposite point.
+It is a segment of chapter 2 from rest with an even number of arcs p = 2 n, except that A''(1) need
+not vanish. Backwards in time it returns to rest, (1.56) to (1.58). With a constant amplitude it is
+a swing between the target and its opposite point.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Float[Array,
 
 @jax.jit
 def steady(segment: Segment) -> Segment:
-    """The swing of constant size that a transition ends in."""
+    """The swing of constant amplitude in which a transition ends."""
     return dataclasses.replace(
         segment, start_radius=segment.end_radius, end_curvature=jnp.zeros_like(jnp.asarray(segment.end_curvature))
     )

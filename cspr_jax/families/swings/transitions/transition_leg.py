@@ -17,7 +17,7 @@ from cspr_jax.numerics.elementary import as_float64
 
 
 class Transitions(Leg):
-    """Rest and targets, joined by transitions and by swings of constant size; see `Leg`."""
+    """Rest and targets, joined by transitions and by swings of constant amplitude; see `Leg`."""
 
     step = 2
 
@@ -27,10 +27,10 @@ class Transitions(Leg):
         pairs = list(zip(waypoints.poses[:-1], waypoints.poses[1:], strict=True))
         for i, (start, end) in enumerate(pairs):
             _check_pair(waypoints, i, start, end)
-        # A way back to rest runs against its normalised time, (1.56) to (1.58).
+        # A transition to rest is one from rest backwards in time, (1.56) to (1.58).
         self._backwards = np.array([end.rest for _, end in pairs])
         self._steady = np.array([not (start.rest or end.rest) for start, end in pairs])
-        # Which pose is the target of each segment.
+        # Index of the pose that is the target of each segment.
         self._target = np.arange(len(pairs)) + np.where(self._backwards, 0, 1)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
@@ -63,7 +63,7 @@ class Transitions(Leg):
 
 
 def _with_swings(segments: Segment, is_steady: np.ndarray) -> Segment:
-    # Replace steady transitions by the swing of constant size at their target.
+    # Replace steady transitions by the swing of constant amplitude at their target.
     def choose(swing, transition):
         swing = np.broadcast_to(swing, np.shape(transition))
         return np.where(is_steady.reshape(-1, *[1] * (np.ndim(transition) - 1)), swing, transition)

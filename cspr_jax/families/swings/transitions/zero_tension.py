@@ -23,7 +23,7 @@ def least_oscillations(weights: Float[Array, "n_cables"], inclination: Float[Arr
 def best_inclination(weights: Float[Array, "n_cables"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
     """The inclination that asks for the fewest oscillations with A = tau: (1.117) and (1.118).
 
-    Either it shares the load between the two extreme cables, v = -(w_hi + w_lo) / 2, or the cable with the
+    Either it divides the load between the two extreme cables, v = -(w_hi + w_lo) / 2, or the cable with the
     largest weight has its own minimum before that, at v = -1 / w_C.
     """
     high, low = jnp.max(weights), jnp.min(weights)

@@ -25,16 +25,17 @@ from cspr_jax.outputs.plots.motions.trajectory import add_tension_bar, name_spoo
 from cspr_jax.outputs.plots.robots.obstacles import AREA, draw_bodies, points_of
 from cspr_jax.outputs.plots.robots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.style.fitting import fit, legend_above
-from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look
+from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_style
 from cspr_jax.outputs.plots.style.scene import colours_of_tension, fill_panels, set_space, shape_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.quantities import FAILURES
 
 ENDINGS = (".gif", ".mp4", ".html")
 RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
-# Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
-# are whole hundredths of a second. The pictures of a page are whole ones each.
-RATES, LARGEST_COUNT, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
+# Pictures per second: the first rate with which a film has no more pictures than allowed, else the last one. The delays
+# of a GIF are whole hundredths of a second.
+RATES = (20, 10, 5, 2, 1)
+LARGEST_COUNT, OF_PAGES = 600, 150  # pictures of a film; those of a page are stored completely
 FIGURE_SIZE, DPI = (10.0, 7.2), 90
 # Height over width below which a robot lies above its tensions, and not beside them.
 WIDE = 0.85
@@ -62,7 +63,7 @@ def film(
     seconds = float(time[-1] - time[0]) / speed
     maximum = OF_PAGES if ending == ".html" else LARGEST_COUNT
     rate = next((rate for rate in RATES if seconds * rate <= maximum), RATES[-1])
-    # The end is shown, at most a part of a picture too late.
+    # The last picture shows the end, and comes at most a fraction of a picture's time too late.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
     times = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
     rows = np.clip(np.searchsorted(time, times - 1e-9), 0, len(time) - 1)
@@ -149,7 +150,7 @@ class _Picture:
         self._draw_space(points, is_down=robot_file.z_axis == "down")
         self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, plan_file))
         self.figure.suptitle(title)
-        # Lay the figure out once: places of axes do not change.
+        # Lay the figure out once: positions of axes do not change.
         self.show(0)
         fit(self.figure)
         fill_panels(self.figure)
@@ -169,7 +170,7 @@ class _Picture:
         name_spools(space, robot.base)
         ends = segment_rows(self._columns, self._time)
         draw_ends(space, self._path, ends)
-        # The object that is released, and its way since then.
+        # The released object, and its path since the release.
         self._flown = space.plot([], [], [], color=COLOURS[2], linewidth=1.4, linestyle="--")[0]
         self.object = space.plot([], [], [], linestyle="", marker="o", markersize=6, color=COLOURS[2])[0]
         if self._flight is not None:
@@ -193,7 +194,7 @@ class _Picture:
 
     def _draw_tensions(self, panel: Any, limits: list[tuple[str, float]]) -> None:
         for k, values in enumerate(self.tension.T):
-            panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
+            panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_style(k))
         draw_limits(panel, limits, self.tension, "N")
         shade_failing(panel, self._failing, "tension")
         self._mark = panel.axvline(self._time[0], color=TIME_COLOUR, linewidth=1.8)

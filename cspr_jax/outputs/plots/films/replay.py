@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cspr_jax.outputs.mujoco.replay import PlayedPlan
 from cspr_jax.outputs.plots.style.fitting import legend_above
-from cspr_jax.outputs.plots.style.labels import COLOURS, line_look
+from cspr_jax.outputs.plots.style.labels import COLOURS, line_style
 from cspr_jax.outputs.table_layout import two_digits
 
 # Fraction of the length of the path that typed digits may leave across a plane.
@@ -64,7 +64,7 @@ def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) 
     time = replay.time[starts]
     drawn = {name: _largest(deviations, starts) for name, deviations in values.items()}
     for k, (name, deviations) in enumerate(drawn.items()):
-        panel.plot(time, deviations, linewidth=1.0, label=name, **line_look(k))
+        panel.plot(time, deviations, linewidth=1.0, label=name, **line_style(k))
     _whole_decades(panel, np.concatenate(list(drawn.values())))
     panel.set_xlabel("time (s)")
     panel.margins(x=0.01)

@@ -80,8 +80,8 @@ def boundary(sides: BoundarySides) -> Boundary:
     """The boundary of the inside, by marching simplices: six tetrahedra, or two triangles, for each cell.
 
     It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
-    and no other, so that it parts the points exactly as their verdicts do. Where margins decide it crosses where the
-    first of them, linear on the edge, is zero; elsewhere half-way.
+    and no other, so that it separates the points exactly as their verdicts do. Where margins decide, it crosses where
+    the first of them is zero by linear interpolation; elsewhere half-way.
     """
     # Around the grid lies a layer without thickness that is outside.
     is_in = np.pad(sides.verdict == 0, 1)
@@ -159,7 +159,7 @@ def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
     for is_end in (True, False):
         for chain in _chains(surface.pieces[surface.is_end == is_end]):
             corners = surface.corners[chain]
-            # Leave out corners on diagonals, where only chance has put them: the sides of a cell are parted as well.
+            # Leave out corners on diagonals, whose position is arbitrary: corners on the sides of the cell suffice.
             on_edge = np.isin(corners[:, 0], sides.points[0]) | np.isin(corners[:, 1], sides.points[1])
             if not on_edge[0]:  # a closed line that starts on one
                 corners, on_edge = np.roll(corners[:-1], -1, axis=0), np.roll(on_edge[:-1], -1)

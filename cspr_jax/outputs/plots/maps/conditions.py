@@ -27,7 +27,7 @@ def is_workspace(result: Result) -> bool:
 
 
 def said(result: Result) -> list[str]:
-    """Phrase with which the title of a picture of a map names its conditions."""
+    """Phrase for the title of a map that names its conditions."""
     return [conditions(result)] if is_workspace(result) and result.settings else []
 
 

@@ -18,10 +18,10 @@ SHOWN = ("lowest_frequency", "highest_frequency", "natural_frequency", "used_fre
 SIZES = ("circle_radius", "scale")
 # Quantities that hold at one frequency.
 AT_A_FREQUENCY = ("verdict", "margin", "used_frequency", "binding_cable", "duration", "tension_margin", "limit_margin")
-# Height of the picture, in parts of the largest natural frequency, where ends do not fill it.
+# Largest top of the picture, over the largest natural frequency: ends may lie far above, or at infinity.
 HIGHEST = 2.5
-# Points along the band.
-FINE, HIGHEST_SHOWN = 1001, 1e6
+FINE = 1001  # points along the band
+HIGHEST_SHOWN = 1e6  # rad/s, in place of infinity
 BAND_COLOUR, EDGE = "#cfe3f1", COLOURS[0]
 NATURAL: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.1}
 BEST: dict[str, Any] = {"color": COLOURS[1], "linewidth": 2.4}
@@ -80,7 +80,7 @@ def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.nd
 
 
 def turns_in_words(result: Result, name: str) -> list[str]:
-    """Phrases with which the title of a picture of a map of ellipses says what turns it shows."""
+    """Phrases for the title of a map of ellipses: their size, and at which frequency they are run."""
     if result.attributes.get("map") != "ellipse" or not result.settings:
         return []
     ellipse, words = table(result.settings, "ellipse"), []
@@ -101,15 +101,15 @@ def _rule(result: Result) -> str | float:
 
 
 def _top(high: np.ndarray, natural: np.ndarray) -> float:
-    # Ends that go on to infinity leave the picture.
+    # Ends that rise to infinity leave the picture.
     usual = HIGHEST * float(np.nanmax(natural, initial=0.0))
     largest = float(np.max(high[np.isfinite(high)], initial=0.0))
     return min(usual, 1.1 * largest) if usual > 0.0 and largest > 0.0 and np.isfinite(high).all() else usual or 1.0
 
 
 def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> list[float]:
-    # The lowest frequency leaves 0 between two points. Beyond the limit its square rises like a straight line; over
-    # sizes, like one over their inverses.
+    # The static limit lies between two points, of which only one has the lowest frequency 0. From the limit on, the
+    # square of that frequency rises linearly with the axis, or with the inverse of a size.
     limits = []
     with np.errstate(divide="ignore"):
         along = 1.0 / points if is_size else points
@@ -140,7 +140,7 @@ def _draw_band(panel: Axes, points: np.ndarray, low: np.ndarray, high: np.ndarra
 
 
 def _joined(points: np.ndarray, values: np.ndarray, zeros: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    # Points of a line, with zeros of it that lie between them.
+    # Insert zeros between the points of a line.
     positions = np.concatenate([points, zeros])
     order = np.argsort(positions, kind="stable")
     return positions[order], np.concatenate([values, np.zeros(len(zeros))])[order]

@@ -1,4 +1,4 @@
-"""Feasible accelerations at an instant of a motion of a point mass, from its file."""
+"""Feasible accelerations at a time of a motion of a point mass, from its file."""
 
 import dataclasses
 
@@ -23,10 +23,10 @@ ROWS = 1 << 14
 
 @dataclasses.dataclass(frozen=True)
 class AccelerationSet:
-    """Feasible accelerations at an instant. Vectors have the axes of the file, but the third one is upward.
+    """Feasible accelerations at a time. Vectors have the axes of the file, but the third one is upward.
 
     Fields:
-        words: the instant, such as "t = 1.2 s".
+        words: the time, such as "t = 1.2 s".
         position: (3,) of the effector, as in the file, m.
         actual: (3,) its acceleration, m/s^2.
         margin: distance of the actual acceleration from the nearest face, m/s^2; negative outside.
@@ -72,7 +72,7 @@ class AccelerationSet:
 
 
 def acceleration_set(result: Result, file: str, at: dict[str, float]) -> AccelerationSet:
-    """Feasible accelerations at an instant of a motion."""
+    """Feasible accelerations at a time of a motion."""
     robot_file, plan_file = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
         error = f'"acceleration" of {robot_file.kind}'
@@ -97,7 +97,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         faces = faces_of(robot, limits, positions[current])
         margin = margins_and_verdicts(robot, faces, faces, positions[current], motion[current])[0]
     if not np.asarray(faces.is_regular)[0]:
-        raise InputError("--at", words, "an instant at which the cables span the space, or the plane of a planar robot")
+        raise InputError("--at", words, "a time at which the cables span the space, or the plane of a planar robot")
     upward = np.array([*frame.signs[:2], -1.0])
     rays = np.asarray(robot.base_points) - positions[row]
     return AccelerationSet(

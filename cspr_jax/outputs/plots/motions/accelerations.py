@@ -1,4 +1,4 @@
-"""Diagram of the feasible accelerations at an instant of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
+"""Diagram of the feasible accelerations at a time of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
 
 For a planar robot, everything is in one plane. For a spatial one, there are sections through the actual acceleration: a
 level one, a vertical one that holds zero and gravity, too, and a vertical one across the nearest face, which shows that

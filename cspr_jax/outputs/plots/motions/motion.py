@@ -20,7 +20,7 @@ from cspr_jax.outputs.plots.motions.motion_source import keeps_plan, robot_and_p
 from cspr_jax.outputs.plots.robots.obstacles import draw_shadows
 from cspr_jax.outputs.plots.robots.robot_along import limits_of
 from cspr_jax.outputs.plots.style.fitting import DOUBT, legend_above
-from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_style, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import PARTS
@@ -144,7 +144,7 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     draw_limits(drawn["tension"], limits_of(robot_file, plan_file), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:
-        # The rule by which redundant cables share the load.
+        # The rule that chooses the tensions of redundant cables.
         drawn["tension"].set_ylabel(f"tension (N)\n{plan_file.tension_rule}")
     for _, level in limits_of(robot_file, plan_file, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
@@ -213,7 +213,7 @@ def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
 
 def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:
     for k, name in enumerate(names):
-        panel.plot(time, values[:, k], linewidth=1.2, label=name, **line_look(k))
+        panel.plot(time, values[:, k], linewidth=1.2, label=name, **line_style(k))
     if axis:
         panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("time (s)")

@@ -31,14 +31,14 @@ class MotionPicture(NamedTuple):
     """A picture of a motion.
 
     Fields:
-        draw: makes it from the motion, the name of its file, and the instant.
+        draw: makes it from the motion, the name of its file, and the time.
         needed_quantity: quantity that the file must have; empty for none.
-        at_instant: whether it shows one instant, "t".
+        at_time: whether it shows one time, "t".
     """
 
     draw: Callable[[Result, str, dict[str, float]], Figure]
     needed_quantity: str = ""
-    at_instant: bool = False
+    at_time: bool = False
 
 
 def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
@@ -53,7 +53,7 @@ MOTION_PICTURES = {
     ),
     TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
     SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
-    ACCELERATION: MotionPicture(_acceleration, at_instant=True),
+    ACCELERATION: MotionPicture(_acceleration, at_time=True),
     PATH_ACCELERATION: MotionPicture(
         lambda result, file, _: path_figure(result, file), needed_quantity=PATH_ACCELERATION
     ),
@@ -64,9 +64,9 @@ MOTION_PICTURES = {
 
 def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
     """The requested picture of a motion."""
-    at_instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
-    if at and quantity not in at_instants:
-        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(at_instants)}")
+    at_times = [name for name, row in MOTION_PICTURES.items() if row.at_time]
+    if at and quantity not in at_times:
+        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(at_times)}")
     if quantity is None:
         return motion_figure(result)
     possible = [

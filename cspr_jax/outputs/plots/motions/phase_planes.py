@@ -97,7 +97,7 @@ def _draw_passes(panel: Axes, data) -> None:
 
 
 def _draw_failures(panel: Axes, s: np.ndarray, low: np.ndarray, first: list[int]) -> None:
-    # Up to the last place that no speed passes.
+    # Up to the last point that no speed passes.
     is_named = False
     for rows in map(slice, first[:-1], first[1:]):
         unknown, coordinates = np.isnan(low[rows]), s[rows]

@@ -15,7 +15,7 @@ from cspr_jax.outputs.plots.motions.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.motions.trajectory import draw_trajectory, legend_of, points_in_space
 from cspr_jax.outputs.plots.robots.robot_along import limits_of
 from cspr_jax.outputs.plots.style.fitting import legend_above
-from cspr_jax.outputs.plots.style.labels import cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.style.labels import cable_names, line_style, robot_name
 from cspr_jax.outputs.plots.style.layout import is_narrow
 from cspr_jax.outputs.plots.style.scene import shape_of
 from cspr_jax.outputs.plots.style.word_ticks import reasons
@@ -76,7 +76,7 @@ def _lines(row: list[str]) -> int:
 def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None:
     names = cable_names(result.data)
     for k, values in enumerate(result.data["rate"].T):
-        panel.plot(result.axes["t"], values, linewidth=1.0, label=names[k], **line_look(k))
+        panel.plot(result.axes["t"], values, linewidth=1.0, label=names[k], **line_style(k))
     draw_limits(panel, limits, result.data["rate"], "m/s", signed=True)
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)

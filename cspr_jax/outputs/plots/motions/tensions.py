@@ -10,7 +10,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.motions.motion import FAR, boundaries, doubt, draw_limits, shade_failing
 from cspr_jax.outputs.plots.robots.robot_along import limits_of
-from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_style, robot_name
 from cspr_jax.store.reading.result import Result
 
 
@@ -44,7 +44,7 @@ def draw_tensions(
     low, high = np.min(tension, axis=1), np.max(tension, axis=1)
     panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.35, linewidth=0.0, label="range")
     for k, values in enumerate(tension.T):
-        panel.plot(time, values, linewidth=1.0, label=cable_names(result.data)[k], **line_look(k))
+        panel.plot(time, values, linewidth=1.0, label=cable_names(result.data)[k], **line_style(k))
     panel.plot(time, low, color="black", linewidth=1.4, label="smallest")
     draw_limits(panel, limits, tension, "N")
     finite = tension[np.isfinite(tension)]

@@ -1,4 +1,4 @@
-"""A motion in space: its path, the spools, and the robot at some instants with its cables coloured by tension."""
+"""A motion in space: its path, the spools, and the robot at some times with its cables coloured by tension."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def moving(
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
         edges, quaternion = _edges(robot_file, plan_file, body, centre), np.asarray(quaternion)[rows]
-        # With more cables the reference orientation is that of the axes, and jax need not be loaded.
+        # With more cables the reference orientation is that of the file's axes, and jax need not be loaded.
         if "mass_centre" not in columns and len(base) <= 6:
             from cspr_jax.outputs.platform_poses import of_own_axes
 

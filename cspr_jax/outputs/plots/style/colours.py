@@ -15,9 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from cspr_jax.outputs.plots.style.layout import is_narrow
 
 NONE_COLOUR = "#d0d0d0"
-# The scale ends where this fraction of the cells does, if a scale of all cells would be longer by this factor. If there
-# are no more cells than the third number, all count; if there are more, at least one may lie beyond.
-BULK_FRACTION, LARGEST_RATIO, FEW = 0.98, 1.5, 10
+BULK_FRACTION = 0.98  # of the cells that the scale covers, if a scale of all cells would be too long
+LARGEST_RATIO = 1.5  # of the lengths of both scales, above which it is too long
+FEW = 10  # cells that are all covered; of more, at least one may lie beyond
 # Up to so many counts always have a colour each.
 TOLD_APART = 12
 # Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.

@@ -15,7 +15,7 @@ def table(settings: object, key: str) -> dict:
 
 
 def start(result: Result) -> dict[str, float]:
-    """Start of all segments of a map, if it is one place."""
+    """Start of all segments of a map, if it is one position."""
     coordinates = table(table(result.settings, "trajectory"), "from").get("position") or ()
     moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
     return {} if moving else dict(zip("xyz", coordinates, strict=False))

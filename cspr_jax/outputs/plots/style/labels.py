@@ -34,7 +34,7 @@ WRITTEN = {
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
 
 
-def line_look(number: int) -> dict[str, Any]:
+def line_style(number: int) -> dict[str, Any]:
     """Colour and style of one line of many."""
     style = STYLES[(number + number // len(COLOURS)) % len(STYLES)]
     return {"color": COLOURS[number % len(COLOURS)], "linestyle": style}

@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.style.labels import principal_angle
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
-# Smallest width of a panel, inches, with its part of labels and colour bar.
+# Smallest width of a panel, inches, with its labels and colour bar.
 MIN_WIDTH = 1.6
 # Below this width, cm, a picture is that of a column: its title has one line, its bars lie below the panels.
 NARROW, INCH = 12.0, 2.54

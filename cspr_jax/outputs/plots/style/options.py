@@ -29,7 +29,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         "--quantity",
         help="map: a quantity (default arcs or oscillations; see `cspr quantities`); motion: trajectory, the path in "
         "space; tensions, with their limits; summary, all on one page; acceleration, beside all that are feasible at "
-        "an instant; path_acceleration, over the path, between its bounds; phase_plane, path speeds over the path and "
+        "a time; path_acceleration, over the path, between its bounds; phase_plane, path speeds over the path and "
         "what binds; or landing, of a sample of throws",
     )
     add_best(parser)

@@ -19,8 +19,8 @@ from cspr_jax.numerics.shapes import Float
 ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
 # Margin around the drawn points, over their size.
 MARGIN = 0.04
-# Ticks of an axis at most, and steps that make a picture fit.
-MAX_TICKS, MIN_TICKS, STEPS = 5, 2, 4
+MAX_TICKS, MIN_TICKS = 5, 2  # of an axis
+STEPS = 4  # in which a picture is made to fill its slot
 FILLS = "fills its slot"
 
 
@@ -100,7 +100,7 @@ def fill_panels(figure: Figure) -> None:
         _add_ticks(figure, panel)
         _leave_out(panel)
         if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < MIN_TICKS:
-            # Two numbers show a scale: rather leave out single ones of many.
+            # An axis needs two numbers to show its scale: begin with many, and leave out those that overlap.
             for axis in _axes(panel):
                 axis.set_major_locator(MaxNLocator(MAX_TICKS, prune="both"))
             _fill(figure, panel, slot)
@@ -125,7 +125,7 @@ def _add_ticks(figure: Figure, panel: Any) -> None:
 
 
 def _fill(figure: Figure, panel: Any, slot: Bbox) -> None:
-    # Letters keep their size when the box grows: a few steps.
+    # It takes a few steps, since letters do not grow with the box.
     width, height = figure.get_size_inches()
     side = max(slot.width * width, slot.height * height)
     space = TransformedBbox(slot, figure.transSubfigure)
@@ -143,7 +143,7 @@ def _fill(figure: Figure, panel: Any, slot: Bbox) -> None:
 
 
 def _place_words(figure: Figure, panel: Any) -> None:
-    # Ticks and labels of a panel in space are where it was drawn last; nothing else is needed for that.
+    # Ticks and labels of a panel in space move only when it is drawn: draw it without all else.
     others = [*figure.get_children(), *panel.collections, *panel.lines, *panel.texts]
     others = [artist for artist in others if artist is not panel and not artist.get_animated()]
     for artist in others:

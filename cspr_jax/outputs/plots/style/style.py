@@ -45,9 +45,9 @@ SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
 # Letters of pictures for papers, points; their heights follow from their content.
 PRESETS = {"column": 8.0, "page": 9.0}
 UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
-# Panels take at least this fraction of the height; where they have less the picture gets higher, at most so often.
-MIN_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
-# Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
+MIN_FRACTION = 0.5  # of the height that panels take; where it is less, the picture gets higher
+HIGHER, TRIES = 1.2, 6  # by which factor, and how often at most
+# Where the size of the picture is given, letters of the default size get smaller instead, down to so many points.
 SMALLER, MIN_LETTERS = 0.92, 5.0
 # A picture is held in memory as a whole, several bytes a pixel.
 LARGEST_PIXELS = 1e8
@@ -172,7 +172,7 @@ def _enlarge_panels(figure: Figure, style: Style) -> None:
             figure.draw_without_rendering()
         # Panels without space stay where they were.
         fraction = 0.0 if caught else share_of_panels(figure)
-        if fraction >= MIN_SHARE:
+        if fraction >= MIN_FRACTION:
             return
         if style.size is None and 0.0 < fraction <= before:  # panels of a shape of their own
             figure.set_figheight(figure.get_figheight() / HIGHER)

@@ -1,4 +1,4 @@
-"""Judge of any motion between two poses, by samples: limits, ends, derivatives, and whether accelerations jump.
+"""Verifier of any motion between two poses, by samples: limits, ends, derivatives, and whether accelerations jump.
 
 Derivatives agree with what they are derivatives of by the corrected trapezoidal rule between neighbours,
 
@@ -19,7 +19,7 @@ SUSPECTS = 200
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgement:
+class Verification:
     """What samples say of a motion, each number over the size of what it is compared with.
 
     slacks: least of each limit: over the weight, or the limit; negative where it is broken. depth: least one below the
@@ -113,8 +113,8 @@ def smoothness(state, times):
     return shares
 
 
-def judged(robot, limits, state, duration, start, end, samples=any_motion.SAMPLES, began=0.0):
-    """Judgement of a motion from a pose at zero velocity to another one."""
+def verified(robot, limits, state, duration, start, end, samples=any_motion.SAMPLES, began=0.0):
+    """Verification of a motion from a pose at zero velocity to another one."""
 
     class Motion:
         times = began, began + duration
@@ -142,4 +142,4 @@ def judged(robot, limits, state, duration, start, end, samples=any_motion.SAMPLE
         "rotation": largest(rotated(turns, found.rotation[both])),
         "omega": largest(found.omega[both]) / max(largest(found.omega), 1e-300),
     }
-    return Judgement(slacks, float(depth), ends, smoothness(state, times))
+    return Verification(slacks, float(depth), ends, smoothness(state, times))
