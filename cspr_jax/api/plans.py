@@ -68,7 +68,7 @@ class Plan(Displayed, planning.PlannedMotions):
         Raises:
             ConfigError: as `rows`.
         """
-        from cspr_jax.outputs import motion_json  # likewise
+        from cspr_jax.outputs import motion_json  # few plans are written so
 
         with double_precision():
             return motion_json.rows_object(self, rate)
@@ -94,7 +94,7 @@ class Plan(Displayed, planning.PlannedMotions):
             raise ConfigError(path, "must end in .csv or .h5 or .json")
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
-        from cspr_jax.outputs import motion_json  # only some plans are written so
+        from cspr_jax.outputs import motion_json  # few plans are written so
 
         with double_precision():
             write = motion_json.write_json if path.suffix == ".json" else motion_files.write_rows

@@ -145,7 +145,7 @@ def _stacked(vector: Vector) -> np.ndarray:
 
 
 def _compare(name: str, out: np.ndarray, call: Callable, expected) -> None:
-    # A kernel that computes something else has no rate. Beside singularities float32 has no digits.
+    # Refuse a kernel with other results than the package's. Near singularities float32 has no digits to compare.
     call()
     expected = np.asarray(expected, float)
     computed = out[..., : expected.shape[-1]]

@@ -21,7 +21,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import FLAGS, pose_conditions
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
-# Flags that say something of a motion beside its contacts.
+# A cell shows a clearance if its verdict has no other flags than these.
 _BESIDE = CONTACTS | Verdict.UNDECIDED | Verdict.UNCERTAINTY | Verdict.BELOW_FLOOR
 _COLUMNS = {"tension_margin": "margin", "tension_margin_bound": "margin_bound"}
 

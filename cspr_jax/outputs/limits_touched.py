@@ -18,9 +18,9 @@ from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.proved_answers import MotionProof, cause_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
-# Smallest slack of a criterion over its scale up to which it is compared with the error of interpolation.
+# Criteria are compared with the error of interpolation if their smallest slack, over its scale, is below this.
 NEAR = 1e-3
-# Samples in each piece, and pieces at most, at which motions are compared.
+# Samples per piece, and largest number of pieces, at which motions are compared.
 SAMPLES, MAX_PIECES = 8, 256
 
 
@@ -66,7 +66,8 @@ def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit
 
 
 def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -> tuple[float, float]:
-    # The smallest slack of a criterion about where it fails or is smallest, and what every second sample changes there.
+    # The smallest slack of a criterion, and its largest change if every second sample is left out, near the times at
+    # which the criterion fails or its slack is smallest.
     taus = _sample_times(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
     scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"), trajectory=plan.keys)
 

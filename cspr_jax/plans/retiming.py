@@ -24,8 +24,8 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.attained import with_attained
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Gain over the planned duration that a motion must have to replace the planned one.
-LEAST_GAIN = 1e-4
+# A motion replaces the planned one if it saves this fraction of the duration.
+SMALLEST_GAIN = 1e-4
 # Fraction of the largest path speed of the search, above which a motion counts as not bounded by any limit.
 UNBOUNDED = 0.5
 AWAY = 1e-6  # m; distance from the planned path above which the grid is doubled
@@ -73,8 +73,8 @@ class _Faster(NamedTuple):
 def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> PlannedMotions:
     """A plan whose motions run along their paths in the least time.
 
-    Between two poses at rest the faster motion takes the place of the planned one where it is proved, and faster, or
-    where the planned one is not feasible.
+    Between two poses at rest the new motion replaces the planned one if it is proved, and either faster, or in place of
+    one that is not feasible.
     """
     motions = [motion for leg in plan.legs for motion in leg.motions]
     _check(plan, motions, path)
@@ -122,7 +122,7 @@ def _check(plan: PlannedMotions, motions: list[Motion], path: Path) -> None:
 
 
 def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_time: float) -> list[_Faster]:
-    # On finer grids where motions are too far from their paths.
+    # Fastest motions along paths, on finer grids where they are too far from their paths.
     answers, rows = dict[int, _Faster](), list(range(len(paths)))
     for doubling in range(DOUBLINGS):
         chosen = [paths[k] for k in rows]
@@ -171,7 +171,7 @@ def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]
     better = np.zeros(len(before), bool)
     for name in np.unique(group).tolist():
         rows = group == name
-        is_faster = after[rows].sum() < (1.0 - LEAST_GAIN) * before[rows].sum() or not plan.is_feasible[rows].all()
+        is_faster = after[rows].sum() < (1.0 - SMALLEST_GAIN) * before[rows].sum() or not plan.is_feasible[rows].all()
         better[rows] = answers.feasible[rows].all() and is_faster
     return better
 
@@ -179,7 +179,7 @@ def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]
 def _with_planned(
     plan: PlannedMotions, scene: Scene, answers: Answers, motions: list[Motion], rows: np.ndarray
 ) -> Answers:
-    # Answers, of motions that stay those of the plan: their family has proved them.
+    # Answers with those of the planned motions in `rows`, which are feasible if their family has proved so.
     if not len(rows):
         return answers
     feeds = _feeds(plan)

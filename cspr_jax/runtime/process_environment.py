@@ -15,7 +15,7 @@ from pathlib import Path
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.cores import cores
 
-FEW = 4  # threads that every command needs, for signals, beside those of NumPy's library, one for each core
+FEW = 4  # threads of every command, such as that for signals, besides one per core of NumPy's library
 OF_JAX, OF_JAX_PER_CORE = 16, 4  # threads of jax: some pools of XLA have one for each core
 # Threads of NumPy's and SciPy's library for linear algebra, and of all that use OpenMP. With our small matrices its
 # threads mostly wait in loops, which would take a fifth of the processor time of a plan.
@@ -26,7 +26,7 @@ _SMALL_STACK = 1 << 16  # bytes
 _LARGER = "or the limit of a container or a job, must be larger"
 _THREADS = f"no more threads can be started: `ulimit -u`, {_LARGER}"
 _PROCESSES = f"no more processes can be started: `ulimit -u`, {_LARGER}"
-# Words of XLA, of LLVM and of the loader of shared objects for memory that they do not get.
+# Messages of XLA, LLVM and the loader of shared objects when memory does not suffice.
 _NO_MEMORY = ("RESOURCE_EXHAUSTED", "failed to map segment", "annot allocate memory", "nable to allocate", "bad_alloc")
 _MEMORY = f"memory does not suffice: `ulimit -v`, {_LARGER}"
 
@@ -42,14 +42,15 @@ def configure() -> None:
     os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: one of the user's may end the import of matplotlib
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
     if not sys.warnoptions:
-        # NumPy's warnings name lines of a library: what a user can act on are lines of ours. Workers inherit both.
+        # NumPy's warnings point to code of libraries; users get messages of this program instead. Workers inherit both
+        # settings.
         warnings.filterwarnings("ignore", category=RuntimeWarning)
         os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
         Path.home()
     except RuntimeError:
-        # A user without a name, as in a container. Where folders of the home folder are made, this fails in the usual
-        # way, and everybody does without them.
+        # The user has no home folder, as in a container. Below this path no folder can be made, which all libraries
+        # know how to handle.
         os.environ["HOME"] = os.devnull
 
 

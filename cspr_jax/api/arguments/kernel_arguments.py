@@ -87,7 +87,7 @@ def kernel_problem(
     function = amplitude_of(amplitude, free_end=free_end)
     (check_moved if any_cables else check_determined)(robot)
     prepared_robot, frame = prepared(robot)
-    # As `build.robots.is_redundant_platform` has it.
+    # The same rule as `build.robots.is_redundant_platform`.
     any_tensions = isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof
     limit_values = limits_over(robot, limits, any_tensions=any_tensions, families=families)
     return Problem(prepared_robot, limit_values, function), frame

@@ -222,7 +222,7 @@ def spline(
     options = {"interpolation": interpolation, "ends": ends}
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(samples)):
         return _spline(robot, times, quaternions, samples, **options)
-    # Orientations and knots do not depend on them; coefficients are linear in them.
+    # Orientations and knots do not depend on the traced arrays, and coefficients are linear in these.
     arrays = [jnp.asarray(array, float) for array in samples]
     placed = _spline(robot, times, quaternions, [np.zeros(array.shape) for array in arrays], **options)
     kind = interpolation or ("cubic" if velocities is None else "hermite")

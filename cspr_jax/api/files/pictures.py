@@ -50,9 +50,9 @@ def plot(  # noqa: PLR0913
     Args:
         results: a result of `open_result`, or the path of a result, a run directory or a motion file; or several.
         quantity: map: a quantity; None: "arcs", or the first there is. Motion: "trajectory", the path in space;
-            "tensions", with their limits; "summary", all on one page; "acceleration", beside all that are feasible at
-            the time `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight
-            lines; or "landing", of a sample of throws; None: path and tensions over time.
+            "tensions", with their limits; "summary", all on one page; "acceleration", with the feasible ones at the
+            time `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight lines; or
+            "landing", of a sample of throws; None: path and tensions over time.
         at: map: fixed values of axes, within their ranges; the nearest point is taken. Motion: "t", s.
         best: map: axes of which each cell shows the best point, such as "z0"; see `Result.best`. Quantity "best_z0"
             is that point.
@@ -116,7 +116,7 @@ def sources_beside(plan: str | Path | None, robot: AnyRobot | str | Path | None,
 def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:
     if isinstance(source, Result) or beside["robot"] is None or not is_own_motion(source):
         return completed(source if isinstance(source, Result) else open_result(source), name, **beside)
-    from cspr_jax.api.checks import check_file  # likewise
+    from cspr_jax.api.checks import check_file  # only motions of users need it
 
     return check_file(source, beside["robot"], outputs=["-o"]).plan.to_result()
 

@@ -93,7 +93,7 @@ def _improved(
     bounds: list[tuple[float, float]],
     verified: Callable[[np.ndarray], Verified],
 ) -> np.ndarray:
-    from scipy.optimize import minimize  # likewise
+    from scipy.optimize import minimize  # takes long to import
 
     def of(function, index: int) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: np.asarray(function(parts, arguments, jnp.asarray(x))[index])

@@ -20,12 +20,13 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.spool_plane import is_on_line, is_vertical
 
 COUNT = 6
-# Tolerance, over the largest distance of a spool from the centroid of all, for cables of a pair to be parallel and for
-# the mass centre to lie on the line between them; distance of the mass centre from the ends of this line, over its
-# length.
+# Tolerance for cables of a pair to be parallel, and for the mass centre to lie on the line between their attachment
+# points, over the largest distance of a spool from the centroid; and smallest distance of the mass centre from the ends
+# of this line, over its length.
 SAME_LINE = 1e-6
-# Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
+# Below this determinant of unit moments the cables let the platform turn.
 SMALLEST_MOMENTS = 1e-6
+# Positions at which this is tested, from the centroid of the spools, over their radius.
 _POSITIONS = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
 ALLOWED = "must be six cables in three parallel pairs, with the mass centre between the points of each pair"
 

@@ -81,8 +81,8 @@ def with_derivatives(matrix: Callable[[Array], Array], point: Float[Array, "d"])
 
 
 def _minors(rows: Array) -> Array:
-    # Determinants of three rows for each choice of three columns, in the order of `combinations`. Numbers, since
-    # gathers of columns take much longer.
+    # Determinants of three rows for each choice of three columns, in the order of `combinations`; computed number by
+    # number, since gathering columns takes much longer.
     columns = range(rows.shape[1])
     a, b, c = ([rows[i, j] for j in columns] for i in range(MINOR))
     pairs = {(i, j): a[i] * b[j] - a[j] * b[i] for i, j in itertools.combinations(columns, 2)}

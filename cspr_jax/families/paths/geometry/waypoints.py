@@ -12,7 +12,8 @@ from cspr_jax.errors import InputError
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.shapes import Float, Int
 
-SAMPLES, FEWEST = 2000, 8  # of a motion, among which stops are sought, and of a smooth part at least
+# Samples of a motion, among which stops are sought, and smallest number of samples of a smooth part.
+SAMPLES, FEWEST = 2000, 8
 AT_REST = 1e-9  # speed over the largest one, below which a motion is at rest
 STEPS = 80  # that refine the time of a stop
 # Radius of curvature at the smallest speed, m, below which the motion counts as turning back.

@@ -21,7 +21,7 @@ from cspr_jax.verification.piece_slacks import Sides, close_bounds
 from cspr_jax.verification.proved_answers import TENSIONS
 
 LEFT = 1e-7  # slack over its scale that counts as met
-MORE, STEP = 1.3, 1e-5  # how much margins grow, over what is missed, and at least
+MORE, STEP = 1.3, 1e-5  # margins grow by this multiple of the missing slack, and by this besides
 BINDING = 0.01  # slack over its scale below which a criterion binds
 # After the first round, margins also grow in this fraction of the grid's cells on each side.
 SPREAD = 150

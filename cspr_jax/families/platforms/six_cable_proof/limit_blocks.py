@@ -134,10 +134,10 @@ def _tension_bounds(cable: CableEllipseBounds, _: Array) -> list[Array]:
 def _tension_slacks(enclosed: Enclosed, limit: Array, is_lower: bool) -> Pair:
     limit, (low, high), (under, over) = limit[None, :, None], enclosed.coefficients, enclosed.nodes
     if is_lower:
-        current, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
+        attained, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
     else:
-        current, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
-    return jnp.min(current, axis=1), jnp.min(bound, axis=(0, 1))
+        attained, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
+    return jnp.min(attained, axis=1), jnp.min(bound, axis=(0, 1))
 
 
 def _rates(node: Node) -> list[tuple[Array, Array, Array]]:

@@ -4,8 +4,7 @@ Every block of a motion (`tension_blocks`) is proved, or refuted by a sample, or
 
     proved       if every block is proved: no cable slack, no singularity, limits on the motion met
     refuted      if some sample breaks a criterion by more than the tolerance
-    undecided    if a block still holds zero where its slack is enclosed within half the tolerance, or after many
-    halvings
+    undecided    if a block stays open although its slack is enclosed within half the tolerance, or after many halvings
 
 A limit that is touched counts as met: the slacks of limits are those of `problem.touchable`, and undecided within
 rounding alone.
@@ -192,7 +191,7 @@ class Certifier:
             bounds = in_batches(kernel, items, batch_size=self._batch, axis=-1)
             index = np.ix_(remaining, np.array(order.cables))
             low[index], high[index] = np.fmax(low[index], bounds.low.T), np.fmin(high[index], bounds.high.T)
-            # Go on as in `_looked_at`, where the first three cables lie nearly in one plane.
+            # Go on, as in `_bounds_in_orders`, with blocks in which the first three cables lie nearly in one plane.
             remaining = remaining[_rounding_matters(bounds)]
             if not len(remaining):
                 break

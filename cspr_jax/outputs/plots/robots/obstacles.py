@@ -19,11 +19,11 @@ from cspr_jax.outputs.plots.style.scene import across_and_up
 from cspr_jax.robots.model.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.reading.result import Result
 
-# Points of a circle.
+# Number of points on a circle.
 CIRCLE_POINTS = 48
 COLOUR = "#5c3d2e"
 AREA: dict[str, Any] = {"facecolor": (*to_rgb(COLOUR), 0.35), "edgecolor": COLOUR, "linewidth": 0.8}
-# Directions of the points of a ball: of azimuths and of heights.
+# Numbers of azimuths and of elevations of the points on a ball.
 AROUND, UPWARD = 64, 33
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
