@@ -130,7 +130,7 @@ def test_functions_are_sampled():
     check = cspr_jax.check("prototype", swing, duration=3.0)
     assert check.verdict == "undecided" and check.margin > 0.0 and not np.isfinite(check.margin_bound)
     times = np.linspace(0.0, 3.0, 3001)
-    places = np.stack([swing(t) for t in times])
+    places = np.stack([0.1 * np.cos(3.0 * times), 0.1 * np.sin(3.0 * times), np.ones_like(times)], axis=1)
     velocities = 0.3 * np.stack([-np.sin(3 * times), np.cos(3 * times), 0 * times], axis=1)
     accelerations = -9.0 * (places - [0.0, 0.0, 1.0])
     exact = cspr_jax.check("prototype", times, places, velocities=velocities, accelerations=accelerations)

@@ -169,6 +169,7 @@ SAMPLES = {
 }
 
 
+@pytest.mark.quick("natural", "quintic", "hermite of accelerations")
 @pytest.mark.parametrize("kind", SAMPLES)
 def test_splines_are_differentiated_by_their_samples(kind):
     """What jax traces gives the same motion as numbers do, and its derivative: it is linear in them."""

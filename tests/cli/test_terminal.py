@@ -70,6 +70,7 @@ def test_tables_fit_the_encoding(encoding):
         assert "p -> inf" in texts[1] and len({len(text) for text in texts}) == 1
 
 
+@pytest.mark.quick("settings0-words0", "settings1-words1", "settings1-words4")
 @pytest.mark.parametrize("words", [["robots"], ["quantities"], ["examples"], ["--help"], ["table", "--list"]])
 @pytest.mark.parametrize(
     "settings", [{"PYTHONIOENCODING": "latin-1:strict"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
@@ -80,6 +81,7 @@ def test_commands_print_in_any_encoding(words, settings):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")
+@pytest.mark.quick("words0", "words3", "words4")
 @pytest.mark.parametrize("words", [["robots"], ["examples"], ["--help"], ["--version"], ["robots", "--json"]])
 def test_a_full_output_is_one_line(words):
     with open("/dev/full", "w") as full:
@@ -89,6 +91,7 @@ def test_a_full_output_is_one_line(words):
     assert (done.returncode, done.stderr) == (4, b"cspr: standard output: No space left on device\n")
 
 
+@pytest.mark.quick("words0", "words3")
 @pytest.mark.parametrize("words", [["robots"], ["quantities"], ["--help"], ["robots", "--json"]])
 def test_a_closed_pipe_is_silent(words):
     reading, writing = os.pipe()

@@ -113,9 +113,9 @@ def excess(name: str, seed: int, width: float, fraction: float = 1.0, *, parabol
 @pytest.mark.parametrize("parabolas", [False, True])
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_bands_contain_functions(name, parabolas):
-    for seed in range(40):
-        for width in (1.0, 0.1, 1e-9):
-            assert excess(name, seed, width, parabolas=parabolas)[0] <= 0.0
+    # Remainders are largest in wide blocks; in narrow ones rounding is what is left.
+    for width, count in ((1.0, 40), (0.1, 8), (1e-9, 8)):
+        assert max(excess(name, seed, width, parabolas=parabolas)[0] for seed in range(count)) <= 0.0
 
 
 @pytest.mark.parametrize("name", OPERATIONS)
@@ -139,11 +139,10 @@ def test_ends_and_tops_of_parabolas():
     """Bounds of the values are those of the parabola, not of its three parts."""
     f, band = functions(3, 1.0, 200, parabolas=True)
     curve = band.middle + band.linear * S[:, None] + band.square * S[:, None] ** 2
-    for side, values in ((band.low() + band.radius, curve.min(0)), (band.high() - band.radius, curve.max(0))):
-        np.testing.assert_allclose(
-            np.asarray(side), values.astype(float), atol=1e-4 * np.abs(values).max().astype(float)
-        )
-    assert ((f >= np.asarray(band.low())) & (f <= np.asarray(band.high()))).all()
+    low, high = map(np.asarray, jax.jit(lambda band: (band.low(), band.high()))(band))
+    for side, values in ((low + band.radius, curve.min(0)), (high - band.radius, curve.max(0))):
+        np.testing.assert_allclose(side, values.astype(float), atol=1e-4 * np.abs(values).max().astype(float))
+    assert ((f >= low) & (f <= high)).all()
 
 
 @pytest.mark.parametrize("name", ["product", "square", "reciprocal", "root", "arc_sine", "cosine"])
@@ -165,6 +164,12 @@ def test_lengths_of_vectors_that_vanish():
 def test_nothing_is_known_where_a_function_may_vanish():
     near = AffineBounds(np.array(0.1), np.array(0.05), np.array(0.06))
     regularization = near._replace(square=np.array(-0.03), radius=np.array(0.03))
-    for operation in (Bounds.reciprocal, Bounds.root, Bounds.reciprocal_root):
-        assert np.isnan(operation(near).radius) and np.isnan(operation(regularization).radius)
-    assert np.isnan(Bounds.arc_sine(near * 5.0 - 1.0).radius) and np.isfinite(Bounds.arc_sine(near).radius)
+
+    @jax.jit
+    def radii(near, regularization):
+        roots = (Bounds.reciprocal, Bounds.root, Bounds.reciprocal_root)
+        unknown = [operation(x).radius for operation in roots for x in (near, regularization)]
+        return [*unknown, Bounds.arc_sine(near * 5.0 - 1.0).radius], Bounds.arc_sine(near).radius
+
+    unknown, known = radii(near, regularization)
+    assert np.isnan(unknown).all() and np.isfinite(known)

@@ -167,6 +167,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.quick("half", "more results", "no shapes", "no tree")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_program_with_right_sums_that_cannot_be_used_is_made_again(folder, fault):
     """Once: what takes its place is used by the next run."""
