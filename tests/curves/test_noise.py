@@ -41,7 +41,7 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize("rate", [10, 25, 100, 1000])
+@pytest.mark.parametrize("rate", [10, 25, 100, pytest.param(1000, marks=pytest.mark.thorough)])
 def test_clean_motions_and_fine_rounding_raise_no_alarm(name, rate):
     times = np.arange(0.0, 10.0 + 1e-9, 1.0 / rate)
     places = MOTIONS[name](times)
@@ -61,7 +61,10 @@ def test_rounding_is_noise(name, rate, decimals):
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize(("rate", "deviation"), [(25, 3e-3), (100, 1e-3), (1000, 1e-5), (1000, 1e-3)])
+@pytest.mark.parametrize(
+    ("rate", "deviation"),
+    [(25, 3e-3), (100, 1e-3), *(pytest.param(1000, x, marks=pytest.mark.thorough) for x in (1e-5, 1e-3))],
+)
 def test_noise_is_told_with_its_size(name, rate, deviation):
     rng = np.random.default_rng(5)
     times = np.arange(0.0, 10.0 + 1e-9, 1.0 / rate)

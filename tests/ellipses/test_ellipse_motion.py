@@ -23,7 +23,7 @@ def robot(z_axis="down"):
     return cspr_jax.point_mass(spools if z_axis == "down" else spools * UP, mass=0.8, gravity=GRAVITY, z_axis=z_axis)
 
 
-@pytest.mark.parametrize("z_axis", ["down", "up"])
+@pytest.mark.parametrize("z_axis", [pytest.param("down", marks=pytest.mark.thorough), "up"])
 def test_places_and_derivatives(z_axis):
     turns, frequency, phase = 1.7, 2.3, 0.4
     axes = UP if z_axis == "up" else np.ones(3)

@@ -74,6 +74,7 @@ def test_quaternions_may_jump_to_their_negatives(turning, monkeypatch):
         np.testing.assert_allclose(followed(tasks, [motion], duration, KEYS["z0"])[0].quaternion, expected, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_given_accelerations_are_those_at_the_poses(turning):
     motion, question, duration, _ = turning
     with double_precision():
@@ -102,6 +103,7 @@ def test_energy_is_that_of_the_tensions_that_are_printed():
     assert energy == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_no_search_begins_where_rodrigues_vectors_end(turning):
     motion, question, duration, _ = turning
     form = ClosedForm("hypocycloid", [motion], np.array([True]), duration)

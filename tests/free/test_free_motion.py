@@ -179,7 +179,11 @@ def test_bounds_tighten_more_each_time(aside):
 
 
 @pytest.mark.parametrize(
-    ("misses", "starts", "intervals"), [(3, None, [6, 6, 12, 4]), (0, None, [6]), (0, 1, [6, 6, 12])]
+    ("misses", "starts", "intervals"),
+    [
+        (3, None, [6, 6, 12, 4]),
+        *(pytest.param(0, *one, marks=pytest.mark.thorough) for one in ((None, [6]), (1, [6, 6, 12]))),
+    ],
 )
 def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch, misses, starts, intervals):
     """The search after the usual ones is for such segments alone, not for those of which no two starts agree."""

@@ -40,6 +40,7 @@ def nominal():
     return solve(RING, LIMITS, ASIDE)
 
 
+@pytest.mark.thorough
 def test_a_motion_is_proved_for_all_robots_and_samples_agree(nominal):
     off = uncertain(spool_positions=SPOOLS, mass_factor=FACTOR)
     free, frame = solve(RING, LIMITS | {"uncertainty": off}, ASIDE)

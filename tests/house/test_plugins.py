@@ -65,6 +65,7 @@ def test_a_map_from_an_empty_folder(tmp_path):
     assert command(tmp_path, "plot", "run", "-o", "picture.png")[::2] == (0, "")
 
 
+@pytest.mark.quick("def (", "None")
 @pytest.mark.parametrize(
     "content", ["import absent", "def (", "1 / 0", "KIND = 1", "raise OSError('two\\nlines')", None]
 )

@@ -189,7 +189,7 @@ def test_a_line_through_a_spool_is_singular(limits):
 PEAKS = {"cubic": 6.0, "quintic": 10.0 / np.sqrt(3.0)}
 
 
-@pytest.mark.quick("limits0-quintic", "limits1-s-curve")
+@pytest.mark.quick("limits1-s-curve")
 @pytest.mark.parametrize("law", ["quintic", "cubic", "s-curve"])
 @pytest.mark.parametrize("limits", [{}, {"tension_min": 0.5, "cable_speed_max": 50.0}])
 def test_no_motion_exceeds_the_largest_acceleration(law, limits):

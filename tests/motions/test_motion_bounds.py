@@ -107,7 +107,7 @@ def drawn(name, seed):
 
 
 # Platforms compile for seconds.
-@pytest.mark.quick("cubic", "bezier", "transition", "hypocycloid-standard")
+@pytest.mark.quick("cubic", "transition", "hypocycloid-standard")
 @pytest.mark.parametrize(
     "name", [name if name != "plain" else pytest.param(name, marks=pytest.mark.thorough) for name in CASES]
 )
@@ -119,6 +119,7 @@ def test_bands_contain_states(name):
 
 
 # What does not compile another kernel is quick enough.
+@pytest.mark.quick("s-curve", "hypocycloid-standard")
 @pytest.mark.parametrize("name", ["s-curve", "bezier", "hypocycloid-standard", "hypocycloid"])
 def test_bands_close_with_the_square_of_blocks(name):
     """Where no knot is near: the third derivative of s-curves jumps, and so does that of the amplitude."""

@@ -117,7 +117,7 @@ QUICK = ("prototype", "boralugoda-rectangle")
 
 
 @pytest.mark.ci("laval-mssm-0.05")
-@pytest.mark.quick("prototype-0.0", "prototype-0.05")
+@pytest.mark.quick("prototype-0.05")
 @pytest.mark.parametrize(
     ("name", "wheels"),
     [(name, 0.0) if name in QUICK else pytest.param(name, 0.0, marks=pytest.mark.thorough) for name in CASES]

@@ -33,7 +33,7 @@ def passes(places, target):
     return float(np.linalg.norm(places - np.asarray(target), axis=1).min())
 
 
-@pytest.mark.quick("polyline-corner1", "cubic-corner2")
+@pytest.mark.quick("polyline-corner1")
 @pytest.mark.parametrize(("kind", "corner"), [("line", {}), ("polyline", {}), ("cubic", {}), ("quintic", {})])
 def test_a_path_of_its_own_is_that_between_poses(kind, corner):
     """[path] with points, the same points as poses, and as points of the path of one pose."""

@@ -70,7 +70,7 @@ def cells_of(result):
         yield place, {name: data[index] for name, data in values.items()}
 
 
-@pytest.mark.quick("arcs", "starts")
+@pytest.mark.quick("starts")
 @pytest.mark.parametrize(
     "sweep",
     [

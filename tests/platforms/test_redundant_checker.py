@@ -170,6 +170,7 @@ def test_distances_between_cables_are_those_of_segments(robot, example, rows):
         assert segment["cable_interference"] is False and segment["platform_interference"] is None
 
 
+@pytest.mark.thorough
 def test_limits_that_are_too_tight_refuse_and_infinite_ones_do_not(example):
     """The verdict says what is wrong and by how much; without largest tensions nothing changes here."""
     free = cspr_jax.plan(FIXED | {"pose": [{"rest": True}, POSE]})
@@ -182,6 +183,7 @@ def test_limits_that_are_too_tight_refuse_and_infinite_ones_do_not(example):
     assert example.feasible
 
 
+@pytest.mark.thorough
 def test_cables_that_cross_are_refused():
     """A platform that turns by half a turn."""
     rotated = POSE | {"tilt_torsion": [0.0, 0.0, 3.0]}

@@ -101,7 +101,7 @@ EACH = [
 ]
 
 
-@pytest.mark.quick("prototype-True", "laval-mssm-False")
+@pytest.mark.quick("laval-mssm-True")
 @pytest.mark.parametrize("parabolas", [False, True])
 @pytest.mark.parametrize("name", EACH)
 def test_bounds_of_cables_and_balances(name, parabolas):

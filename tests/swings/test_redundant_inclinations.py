@@ -60,6 +60,7 @@ def test_maps_have_the_verdicts_of_plans(tmp_path):
             assert cell.verdict != 0 and cell.oscillations == 0
 
 
+@pytest.mark.thorough
 def test_searches_from_python_have_the_numbers_of_plans():
     robot = cspr_jax.load_robot("boralugoda-planar-three")
     answers = cspr_jax.minimum_oscillations(robot, [[80.0, 0.0, 5.0]], z0=25.0)

@@ -141,6 +141,7 @@ def test_the_best_inclination_with_the_best_epsilon(tmp_path):
     assert found["amplitude"] != best["amplitude"] and found["total_duration"] <= best["total_duration"]
 
 
+@pytest.mark.quick("conservative")
 @pytest.mark.parametrize("how", ["mean", "conservative", "fastest"])
 def test_depths_that_are_chosen(tmp_path, how):
     found = planned(tmp_path, text(depth=f'z0 = {{ choose = "{how}" }}'))
