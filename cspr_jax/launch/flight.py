@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.config.keys.launch import LaunchTable
@@ -15,17 +14,18 @@ from cspr_jax.numerics.shapes import Float
 
 # Distance of a point of release from the parabola, over its distance from the target, up to which it lies on it.
 ON_PARABOLA = 1e-6
+DOWN = np.array([0.0, 0.0, 1.0])
 
 
 def flown(position: Any, velocity: Any, gravity: Any, time: Any) -> tuple[Any, Any]:
     """Position and velocity in free flight, launch paper (26)."""
-    down = jnp.asarray([0.0, 0.0, 1.0]) * gravity
+    down = DOWN * gravity
     return position + velocity * time + 0.5 * down * time**2, velocity + down * time
 
 
 def aimed(position: Any, target: Any, gravity: Any, time: Any) -> Any:
     """Velocity at the release with which a target is reached after a time, launch paper (26a)."""
-    down = jnp.asarray([0.0, 0.0, 1.0]) * gravity
+    down = DOWN * gravity
     return (target - position) / time - 0.5 * down * time
 
 

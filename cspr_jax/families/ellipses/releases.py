@@ -18,8 +18,6 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.families.ellipses import harmonics
@@ -77,14 +75,11 @@ class ReleaseRequirement(NamedTuple):
     def states(self, times: Any) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
         """Position and velocity of the release."""
         parabola, gravity = self.parabola, self.problem.robot.gravity
-
-        def one(time: Any) -> tuple[Any, Any]:
-            if parabola.point is None:
-                return flown(parabola.target, parabola.velocity, gravity, -time)
-            return jnp.asarray(parabola.point), aimed(parabola.point, parabola.target, gravity, time)
-
-        position, velocity = jax.vmap(one)(np.asarray(times, float))
-        return np.asarray(position), np.asarray(velocity)
+        time = np.asarray(times, float)[:, None]
+        if parabola.point is None:
+            return flown(parabola.target, parabola.velocity, gravity, -time)
+        velocity = aimed(parabola.point, parabola.target, gravity, time)
+        return np.broadcast_to(parabola.point, velocity.shape), velocity
 
     def ellipses(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Ellipse:
         """Ellipses that pass the point of the release with its velocity."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -80,6 +81,7 @@ def static_state(state: StateKind, *, accelerated: bool) -> StateKind:
     return state._replace(**changes)
 
 
+@jax.jit
 def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
     """Parts of the wrench balance at one point."""
     unit = wrench_units(robot)

@@ -125,14 +125,16 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
     for node, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
         if x > 0.0:
             points = points_on(path.section.curve, path.grid.nodes[[node]], ahead=node == 0)
-            state = state_at(jax.tree.map(lambda x: x[0], points))
-            along = multipliers.wrench[node] @ unit_wrenches(robot, state).momentum
-            along += (
-                multipliers.cable_acceleration[node] @ cable_motion(robot, state)[1]
-                + multipliers.acceleration[node] @ state.velocity
-            )
-            total += 0.5 * sign * x * float(along)
+            duals = multipliers.wrench[node], multipliers.cable_acceleration[node], multipliers.acceleration[node]
+            total += 0.5 * sign * x * float(_of_end(robot, jax.tree.map(lambda x: x[0], points), *duals))
     return total
+
+
+@jax.jit
+def _of_end(robot: AnyRobot, point: PathPoints, wrench: Array, cable_acceleration: Array, acceleration: Array) -> Array:
+    state = state_at(point)
+    along = wrench @ unit_wrenches(robot, state).momentum
+    return along + cable_acceleration @ cable_motion(robot, state)[1] + acceleration @ state.velocity
 
 
 def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:

@@ -111,7 +111,7 @@ def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotio
 
 def _state(path: Discrete, node: int) -> State:
     points = points_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
-    return state_at(jax.tree.map(lambda x: x[0], points))
+    return jax.jit(state_at)(jax.tree.map(lambda x: x[0], points))
 
 
 def _static_tension(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
