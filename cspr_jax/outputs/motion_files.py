@@ -53,7 +53,7 @@ _FIELDS = {
     "omega_dot": "angular_acceleration",
 }
 LARGEST_ROWS = 20_000_000
-# Quantities that may be infinite along the way although the motion itself is finite.
+# Quantities that may be infinite at some times although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
 # A tick nearer to the end of a segment than this, over the time between ticks, is that end.
 SAME_TICK = 1e-6

@@ -16,7 +16,7 @@ LEGEND = (
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
 WIDEST = 10  # columns of a table that are shown in one block
 SIDE_BY_SIDE = 6  # columns of each block of a table with more
-DIGIT_ERROR = 1e-9  # of a number and of half a unit of its last digit
+DIGIT_ERROR = 1e-9  # rounding error of a number, and of half a unit of its last digit, over these
 
 
 @dataclasses.dataclass(frozen=True)

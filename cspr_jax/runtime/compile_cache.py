@@ -32,7 +32,7 @@ LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
 # Frame that readers of zstd skip (RFC 8878, 3.1.2); those of zlib read no further than its end.
 _SKIPPED = b"\x50\x2a\x4d\x18"
-# Part of the name of the folder: kept entries of another form lie in another one.
+# Version of the form of entries; as a part of the folder's name, it gives each form a folder of its own.
 FORMAT = 2
 # With a largest size, jax notes beside each entry when it was used last.
 MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
@@ -47,7 +47,7 @@ PRIVATE = 0o700
 
 @dataclasses.dataclass
 class _KeptEntries:
-    # Entries of former runs that this one has taken: the kept file, and by what the file of this run is known again.
+    # Entries of former runs that this one has taken: each with its kept file, and the identity of the file of this run.
     entries: Path
     folder: Path
     process: int

@@ -1,8 +1,8 @@
-"""Flags and options with which XLA compiles in less time, for code that is slower: plans move a few robots, once."""
+"""Flags and options with which XLA compiles in less time, and makes slower code: for plans, which compute little."""
 
 import os
 
-# Half of the time.
+# With these flags compiling takes half of the time.
 QUICK = (
     "--xla_backend_optimization_level=1",
     "--xla_cpu_use_fusion_emitters=false",
@@ -11,5 +11,5 @@ QUICK = (
 
 
 def proof_options() -> dict[str, int] | None:
-    """Options of jax.jit for kernels of proofs, a third of that time: a motion takes few blocks."""
+    """Options of jax.jit for kernels of proofs, which then take a third of that time: a motion has few blocks."""
     return {"xla_backend_optimization_level": 0} if QUICK[0] in os.environ.get("XLA_FLAGS", "") else None

@@ -149,7 +149,7 @@ class _Programs:
             return None
 
     def _lowered(self, leaves: list, tree: Any, static: dict[str, Any]) -> tuple[Any, bytes]:
-        # Only arrays cross: classes of this package come and go outside.
+        # Programs take and give arrays only: pytrees of this package's classes are made of them outside.
         from cspr_jax.runtime.lowered_programs import lowered
 
         trees = []

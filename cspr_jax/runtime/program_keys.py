@@ -20,7 +20,7 @@ _PLAIN = (bool, int, str, type(None))
 
 
 class Undescribed(Exception):
-    """A value is not described completely by what can be written down."""
+    """A value has no complete description that can be written down."""
 
 
 def described(value: Any) -> Any:
@@ -109,7 +109,7 @@ def tree_of(description: Any) -> Any:
 
 
 def _value(description: Any) -> Any:
-    # The opposite of `described`, of what static parts of results hold.
+    # Value from its description: the opposite of `described`, for the static parts of results.
     if type(description) in _PLAIN:
         return description
     kind, *parts = description

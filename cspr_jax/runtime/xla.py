@@ -44,7 +44,7 @@ _listeners: list[Any] = []
 _ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
 CACHE = "JAX_COMPILATION_CACHE_DIR"
 _KEPT = {
-    # Else the name of the folder is part of the key of each entry.
+    # Without this, the name of the folder would be part of the key of each entry.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",

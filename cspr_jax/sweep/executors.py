@@ -16,7 +16,7 @@ from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.tile import TileMap, compute_tile
 from cspr_jax.sweep.work import Computed
 
-# Times that the workers may die, one after another, without a tile between.
+# Largest number of times that workers may die in a row, without finishing a tile.
 DEATHS = 3
 # If nobody says how many workers, each gets at least so many tiles, since it compiles for itself.
 TILES_EACH = 4

@@ -219,7 +219,7 @@ def _left(estimate: RateEstimate, cells: int, time_now: float | None) -> float |
 
 
 def _state(is_held: bool | None, entries: list[dict[str, Any]], time_now: float) -> tuple[str, str]:
-    # A word, and words for people.
+    # State of a run: one word for programs, and a text for people.
     last = entries[0] if entries else None
     if is_held is None:
         return "unknown", "whether it runs cannot be told here: its disk has no locks"

@@ -1,7 +1,7 @@
 """A plan in MuJoCo's coordinates: what hangs on the cables, its motion, and the tensions that play it.
 
 World axes have z up: those of the robot file, turned by half a turn about x where its z points down. Tensions are at
-both ends and in the middle of each step of the integrator, RK4, which asks for them there. No step runs across an
+both ends and in the middle of each step of the integrator, RK4, which asks for them there. No step runs across a
 time at which the acceleration, or its derivative, may jump.
 """
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.maps.comparison import Compared, comparison_figure
-from cspr_jax.outputs.plots.maps.conditions import excluded, is_workspace, said, shown_first
+from cspr_jax.outputs.plots.maps.conditions import condition_phrases, excluded, is_workspace, shown_first
 from cspr_jax.outputs.plots.maps.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.maps.frequencies import (
     SHOWN,
@@ -20,7 +20,7 @@ from cspr_jax.outputs.plots.maps.frequencies import (
 )
 from cspr_jax.outputs.plots.maps.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.maps.ratio import ratio_of
-from cspr_jax.outputs.plots.maps.sections import POLAR, PlaneSection, in_order, section_figure, tells
+from cspr_jax.outputs.plots.maps.sections import POLAR, PlaneSection, in_order, is_informative, section_figure
 from cspr_jax.outputs.plots.maps.solid import SPACE, is_solid, solid_figure
 from cspr_jax.outputs.plots.motions.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motions.motion_pictures import motion_picture
@@ -201,13 +201,13 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
 
 def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:
     fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.coordinates])
-    return [*said(result), *turns_in_words(result, view.name), *fixed]
+    return [*condition_phrases(result), *turns_in_words(result, view.name), *fixed]
 
 
 def _informative_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
     # The answer is the same for every quantity of a file, so that their pictures show the same sections.
     names = ["verdict"] if "verdict" in result.data else list(result.data)
-    informative = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    informative = [is_informative(name, _panelled(result, _view(result, name, at), order).data) for name in names]
     return np.any(informative, axis=0)
 
 

@@ -24,7 +24,7 @@ from cspr_jax.store.reading.motion_table import read_table
 if TYPE_CHECKING:
     import xarray
 
-# No number of a result is larger, but those that are infinite.
+# Largest magnitude of the finite numbers of a result, and largest mass, kg.
 LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
 # Settings have some ten tables and lists, and some fifty keys.
 _LARGEST_PARTS = 10_000

@@ -26,7 +26,7 @@ def is_workspace(result: Result) -> bool:
     return result.attributes.get("map") == "workspace" and "verdict" in result.data
 
 
-def said(result: Result) -> list[str]:
+def condition_phrases(result: Result) -> list[str]:
     """Phrase for the title of a map that names its conditions."""
     return [conditions(result)] if is_workspace(result) and result.settings else []
 

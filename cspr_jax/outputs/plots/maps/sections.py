@@ -170,7 +170,7 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
             in_whole_numbers(axis)
 
 
-def tells(name: str, data: np.ndarray) -> np.ndarray:
+def is_informative(name: str, data: np.ndarray) -> np.ndarray:
     """Cells that say more than "nothing here": most orientations of a grid are impossible for the robot."""
     if EVERY[name].unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0

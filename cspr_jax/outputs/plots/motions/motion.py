@@ -27,15 +27,16 @@ from cspr_jax.schema.quantities import PARTS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
-# By the quantity that a chart shows: the criteria that it shows. Those that no chart of a figure shows are in its chart
-# of the path, or of the tensions.
+# Flags of the criteria that the chart of each quantity shows. Other criteria are shown in the chart of the path, or of
+# the tensions.
 SHOWN = {"tension": Verdict.WRENCH_INFEASIBLE | Verdict.UNCERTAINTY, "velocity": Verdict.OVER_FEED}
 for _limit in LIMITS:
     if _limit.chart:
         SHOWN[_limit.chart] = SHOWN.get(_limit.chart, Verdict.FEASIBLE) | _limit.flag
 # In longer plans the lines would hide the rest.
 BOUNDARIES = 200
-# Fraction of the distance between spools that typed digits may leave between points of one plane.
+# Points lie in a plane if they are nearer to it than this fraction of the distance between spools: typed numbers are
+# rounded.
 ONE_PLANE = 1e-9
 # Limits beyond this many times the largest value are written and not drawn.
 FAR = 3.0

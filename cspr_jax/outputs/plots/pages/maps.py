@@ -10,7 +10,7 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.numerics.shapes import Int
-from cspr_jax.outputs.plots.maps.conditions import is_margin, said, shown_first
+from cspr_jax.outputs.plots.maps.conditions import condition_phrases, is_margin, shown_first
 from cspr_jax.outputs.plots.maps.sections import in_order
 from cspr_jax.outputs.plots.pages.page import packed
 from cspr_jax.outputs.plots.robots.obstacles import COLOUR, obstacles, outline, section_of
@@ -74,7 +74,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
         "reasons": _reasons(arranged("verdict"), quantity_of(kind.name, "verdict").unflagged)
         if "verdict" in result.data
         else None,
-        "notes": said(result)
+        "notes": condition_phrases(result)
         + notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
         "spools": _spools(result, names[-2:]),
         "obstacles": _obstacles(result, names, points),
