@@ -29,7 +29,7 @@ MANY = 30  # samples, at least, of a motion that is no sequence of waypoints
 MOVING = 0.2  # part of the largest speed that counts as moving
 AT_REST = 1e-6  # m/s; slower samples are at rest but for rounding
 BESIDE = 1e-9  # part of the largest coordinate by which rounding takes a motion off the plane or the guide of a robot
-JOINT_STAYS = 1e-6  # m; by which the joint of a robot moves in a table of six decimals
+JOINT_STAYS = 1e-6  # m; a joint that moves less stays: tables of six decimals are rounded
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 

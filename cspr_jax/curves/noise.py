@@ -21,9 +21,9 @@ MEDIAN = 0.6745
 BENDING = 6.0
 GRAVITY = 9.81
 ACCELERATION = 0.02  # part of gravity, and of the motion's own acceleration, that noise may have
-JUMP_FRACTION = 0.01  # of samples at which the acceleration jumps by so much
-SCATTER = 0.05  # noise is smaller than this part of the range of positions, else the samples are waypoints
-CLOSE = 0.02  # s; or they follow each other so closely
+JUMP_FRACTION = 0.01  # smallest fraction of the samples at which the acceleration jumps by that
+# With more noise, as a fraction of the range of positions, samples are waypoints, unless their steps are short, s.
+SCATTER, CLOSE = 0.05, 0.02
 DECIMALS = range(9)  # at which files round
 ONE_STEP = 0.1  # fraction of the third differences that are not 0
 MIN_SAMPLES = 32

@@ -19,15 +19,15 @@ from cspr_jax.errors import InputError
 MIN_SAMPLES = 5
 LOWEST = -8.0  # power of ten of the weight of the second derivative (time in steps) at which curves meet all samples
 HIGHEST = 24.0
-STEPS = 4.0  # of the power, in which an upper bound is sought
-POWER_ERROR = 1e-4  # of the power
+STEPS = 4.0  # steps of the power in the search for an upper bound of it
+POWER_ERROR = 1e-4  # error of the power
 REFINEMENTS = 3  # of solutions, whose matrices are badly conditioned where weights are large
-# An end moves if, compared with a polynomial that moves there, one at rest has so many times the sum of squared errors,
-# and a curve at rest so many times the sum of squared second derivatives.
+# A record moves at an end if rest there costs too much: ratios of the sum of squared errors of a polynomial at rest to
+# that of a moving one, and of the squared second derivatives of a smoothed curve at rest to those of a moving one.
 FACTOR = 2.0
 COSTS = 1.03
-SURE = 4.0  # standard deviations of the noise that the first factor needs
-FITS = 1.2  # part of their noise by which polynomials miss samples
+SURE = 4.0  # standard deviations of the noise by which the first sum must be larger
+FITS = 1.2  # a polynomial fits samples that it misses by less than this multiple of their noise
 SAMPLE_ERROR = 1e-9  # of the samples
 _COUNTS = np.unique(np.geomspace(6.0, 256.0, 20).astype(int))  # of samples that tell the speed at an end
 REST, MOVING = (1, 2), ()  # derivatives that are 0 at an end

@@ -19,7 +19,7 @@ _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)
 # Normal of each plane, and its letters in the order in which they turn.
 _PLANES = {17: (2, "XY", "IJ"), 18: (1, "ZX", "KI"), 19: (0, "YZ", "JK")}
 MINUTE = 60.0  # s
-# Words that a line names at most, and decimals that count at most.
+# Largest number of words that a message names, and of decimals that count.
 MAX_NAMED, MAX_DECIMALS = 12, 12
 
 

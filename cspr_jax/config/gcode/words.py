@@ -35,7 +35,7 @@ READ = (
 )
 ENDS, PAUSES = (2.0, 30.0), (0.0, 1.0, 6.0, 60.0)
 OVERRIDE = 220.0
-# M words of the standard of NIST, beside which axes may move; behind others stand their own words, or a text.
+# M words of the standard of NIST, with which axes may move in one line. Others have parameters of their own, or a text.
 _STANDARD = {float(code) for code in (*range(12), 30, *range(48, 54), *range(60, 74))}
 _ELSEWHERE = {47.0, 97.0, 98.0, 99.0, 206.0, 428.0}
 # Letters that change no path: of extruders, spindles and tools.

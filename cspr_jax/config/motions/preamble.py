@@ -171,7 +171,8 @@ class Preamble:
     def _refuse_contradictions(
         self, count: int, is_bare: bool, is_unnamed: bool, has_units: bool, heads: list[str]
     ) -> list[str]:
-        # Comments that speak of columns or units where nothing says it in a way that is read; notes about others.
+        # Refuse comments that name columns or units in a way that is not read, where nothing else names them; return
+        # notes about other comments.
         free = [(line, text) for line, text in self._comments if len(text) <= LONGEST_COMMENT and not _is_said(text)]
         plain = plain_names(count, self.has_times)
         spoken = [(line, text, mentioned(text)) for line, text in free]

@@ -24,12 +24,12 @@ from cspr_jax.numerics.shapes import Float
 # A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
 # margin ().
 Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
-# Measured.
-GROUP = 64  # points of which the best is a member
-GENERATIONS = 2  # for each member
-LED = 10  # members for each of the best ones
-STEPS = (0.4, 0.9)  # range of their lengths
-CHANCE = 0.9  # that an unknown takes part in a step
+# These numbers have been chosen by measurements.
+GROUP = 64  # points of a group, the best of which becomes a member
+GENERATIONS = 2  # generations per member
+LED = 10  # members per leader
+STEPS = (0.4, 0.9)  # range of the lengths of steps
+CHANCE = 0.9  # probability that an unknown takes part in a step
 BATCH = 16  # questions
 PART = 256  # questions of a thread at a time
 
