@@ -236,12 +236,53 @@ def test_the_least_energy_under_a_low_ceiling():
 
 @pytest.mark.thorough
 def test_the_least_energy_above_a_floor():
-    """By hand: 0.6 m below the centre, a floor bounds the vertical velocity as a ceiling does."""
+    """By hand: 0.6 m below the centre, a floor bounds the vertical velocity as a ceiling does; it may be touched."""
     change = {"time": None, "choose": "energy"}
-    launch = cspr_jax.plan(content(change, more={"max_arcs": 1, "floor": 0.4}, last=None)).to_dict()["launch"]
+    answer = cspr_jax.plan(content(change, more={"max_arcs": 8, "floor": 0.4}, last=None))
     upward = NATURAL * np.sqrt(0.6**2 - (POINT - CENTRE)[2] ** 2)
     edge = np.roots([0.5 * GRAVITY, -upward, (TARGET - POINT)[2]]).real.max()
-    assert edge * (1.0 - 2e-3) < launch["flight_time"] < edge
+    assert answer.to_dict()["launch"]["flight_time"] == pytest.approx(edge, rel=1e-8)
+    assert answer.feasible and abs(answer.to_dict()["segments"][0]["limit_margin"]) < 1e-8
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("fraction", "feasible"), [(-1e-6, True), (0.0, True), (1e-6, False)])
+@pytest.mark.parametrize("choose", ["energy", "time"])
+def test_a_level_swing_on_the_floor(fraction, feasible, choose):
+    """By hand: only a level release, at one time of flight, leaves an ellipse that does not go through the floor."""
+    size = np.linalg.norm(SPOOLS - SPOOLS.mean(0), axis=1).max()
+    change = {"time": None, "choose": choose, "point": [1.4, 0.5, 1.0], "target": [3.5, 1.8, 0.2]}
+    answer = cspr_jax.plan(content(change, more={"max_arcs": 8, "floor": 1.0 + fraction * size}, last=None))
+    assert answer.feasible == feasible
+    if feasible:
+        time = np.sqrt(2.0 * 0.8 / GRAVITY)
+        assert answer.to_dict()["launch"]["flight_time"] == pytest.approx(time, abs=1e-6 if fraction else 1e-8)
+
+
+@pytest.mark.thorough
+def test_the_slowest_release_touches_the_floor():
+    """The one of least energy of all, by its closed form, above a floor that is as low as its ellipse."""
+    time = np.sqrt(2.0 * np.linalg.norm(TARGET - POINT) / GRAVITY)
+    depth = np.hypot((POINT - CENTRE)[2], aim(POINT, TARGET, time)[2] / NATURAL)
+    size = np.linalg.norm(SPOOLS - SPOOLS.mean(0), axis=1).max()
+    for fraction in (-1e-6, 0.0, 1e-6):
+        limits = {"max_arcs": 8, "floor": CENTRE[2] - depth + fraction * size}
+        answer = cspr_jax.plan(content({"time": None, "choose": "energy"}, more=limits, last=None))
+        found = answer.to_dict()["launch"]["flight_time"]
+        assert answer.feasible and (abs(found - time) < 1e-12) == (fraction <= 0.0)
+
+
+@pytest.mark.thorough
+def test_the_earliest_landing_touches_a_limit():
+    """On eight arcs a largest tension decides: it is reached, and none that lands earlier keeps to it."""
+    more = {"tension_max": 4.2}
+    asked = content({"time": None, "choose": "time"}, more=more, last=None)
+    asked["pose"][1]["arcs"] = 8
+    found = cspr_jax.plan(asked).to_dict()
+    assert found["feasible"] and found["segments"][0]["tension_max"] == pytest.approx(4.2, rel=1e-8)
+    earlier = content({"time": found["launch"]["flight_time"] * (1.0 - 1e-6)}, more=more, last=None)
+    earlier["pose"][1]["arcs"] = 8
+    assert not cspr_jax.plan(earlier).feasible
 
 
 @pytest.mark.soak

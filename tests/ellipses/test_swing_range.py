@@ -170,11 +170,42 @@ def test_floors_and_centres():
     lift = np.array([over.release_z[0] - 2.0, 0.0])
     velocity = (targets[0] - over.releases[0]) / over.flight_time[0] - 0.5 * DOWN * over.flight_time[0]
     lift[1] = velocity[2] / NATURAL
-    assert np.linalg.norm(lift) < 0.3
-    low = swing_range(robot, centres[:1], targets[:1], box, 2.0)
+    assert np.linalg.norm(lift) == pytest.approx(0.3, rel=1e-12)
+    low = swing_range(robot, centres[:1], targets[:1], box, 1.9)
     assert low.verdict[0] == Verdict.BELOW_FLOOR.value and low.largest_margin[0] <= 0.0
     deep = ReleaseBox(np.array([-1.0, -1.0, 2.4]), np.array([1.0, 1.0, 2.6]))
     assert swing_range(robot, centres[:1], np.array([[3.0, 0.0, 3.2]]), deep, 2.3).verdict[0] != 0
+
+
+@pytest.mark.parametrize(("fraction", "feasible"), [(-1e-6, True), (0.0, True), (1e-6, False)])
+def test_swings_on_the_floor(fraction, feasible):
+    """By hand: a level swing on the floor throws level, from the side of the box, and falls 0.2 m."""
+    spools = np.array([[0.3, 0.1, 0.0], [-0.2, 0.3, 0.0], [-0.1, -0.4, 0.0]])
+    box = ReleaseBox(np.array([-1.0, -1.0, 1.2]), np.array([1.0, 1.0, 2.6]))
+    robot = cspr_jax.make_problem(cspr_jax.point_mass(spools, mass=1.0)).robot
+    floor = 2.0 - fraction * np.linalg.norm(spools, axis=1).max()
+    found = swing_range(robot, np.array([[0.0, 0.0, 2.0]]), np.array([[3.0, 0.0, 2.2]]), box, floor)
+    assert found.feasible[0] == feasible
+    if feasible:
+        np.testing.assert_allclose(found.releases[0], [1.0, 0.0, 2.0], atol=1e-6)
+        np.testing.assert_allclose(found.release_speed[0], 2.0 / np.sqrt(0.4 / GRAVITY), rtol=1e-5)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("fraction", "verdict"), [(-1e-6, "feasible"), (0.0, "feasible"), (1e-6, "below_floor")])
+def test_a_plan_touches_the_floor_that_the_map_touches(fraction, verdict):
+    """The release found above a floor, planned above one that is as high, a millionth lower and higher."""
+    start, target, spools = [0.02, 0.0, 2.0], [1.5, 0.3, 2.2], [[1.0, 0.1, 0.0], [-0.6, 0.8, 0.0], [-0.4, -0.9, 0.0]]
+    ranges = {"release_x": [-0.5, 0.5], "release_y": [-0.5, 0.5], "release_z": [1.2, 2.6]}
+    limits = cspr_jax.Limits(floor=np.array(2.3))
+    found = cspr_jax.swing_range(cspr_jax.point_mass(spools, mass=1.0), [target], start=start, limits=limits, **ranges)
+    launch = {"segment": 0, "point": found.releases[0].tolist(), "target": target, "time": float(found.flight_time[0])}
+    # A turn before the release comes by the lowest point.
+    poses = [{"rest": True, "position": start}, {"ellipse": {"centre": start}, "turns": 1, "arcs": 20}]
+    head = {"schema": 1, "robot": {"name": "three", "mass": 1.0, "base_points": spools}, "family": "ellipse"}
+    plan = head | {"limits": {"floor": 2.3 - fraction}, "pose": poses, "launch": launch}
+    (segment,) = cspr_jax.plan(plan).to_dict()["segments"]
+    assert segment["verdict"] == verdict
 
 
 def test_a_centre_on_the_edge_of_the_hull():
@@ -227,6 +258,14 @@ def test_bad_arguments(given, words):
     asked = {"targets": [[0.0, 0.0, 3.0]], "start": [0.0, 0.0, 1.0]} | given | {"robot": robot}
     with pytest.raises(InputError, match=words):
         cspr_jax.swing_range(asked.pop("robot"), asked.pop("targets"), **asked)
+
+
+@pytest.mark.thorough
+def test_a_map_of_swings_on_the_floor(tmp_path):
+    """Level ones: every release is as high as the centre."""
+    data = mapped(tmp_path / "floor", more=GIVEN["more"] + "\n[limits]\nfloor = 2.0").data
+    assert (data["verdict"][..., 1] == 0).all() and (data["verdict"][..., 0] != 0).all()
+    np.testing.assert_allclose(data["release_z"][..., 1], 2.0, atol=1e-8)
 
 
 def test_tiles_change_no_bit(result, tmp_path):

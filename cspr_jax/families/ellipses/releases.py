@@ -24,12 +24,12 @@ from cspr_jax.families.ellipses import harmonics
 from cspr_jax.families.ellipses.frequencies import natural_frequency, sampled_slacks, searched_frequency
 from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import formula_hull
-from cspr_jax.families.ellipses.transfers import Turning, motion_between
+from cspr_jax.families.ellipses.transfers import Turning, motion_between, smallest_transfer
 from cspr_jax.launch.flight import Parabola, aimed, flown
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.clearance import Scene
-from cspr_jax.verification.proved_answers import proof_of, sampled_proof
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
 
 # Times of flight of a grid, over the time of a fall from the plane of the spools to the centre, and their number.
 SHORTEST = 0.01
@@ -37,6 +37,8 @@ LONGEST = 100.0
 GRID = 257
 COARSE_GRID = 33  # times of flight for each number of arcs
 HALVINGS = 40  # of an interval that holds an end of the feasible times
+PROVED_HALVINGS = 24  # of such an interval, by proofs
+PASSES = 8  # grids, each about the best time of the one before
 # Distances from an end of the feasible times that are tried, over the distance to their middle.
 INSIDE = (1e-3, 1e-2, 1e-1)
 SAMPLES = 256  # of a transfer
@@ -116,7 +118,7 @@ def chosen_release(
     frequency, time = rule if isinstance(rule, float) else natural, requirement.parabola.time
     if time is None:
         times = _Times(requirement, frequency, natural)
-        time = times.of_least_energy() if choose == "energy" else times.of_earliest_landing(before, arcs)
+        time = times.of_least_energy(before, arcs) if choose == "energy" else times.of_earliest_landing(before, arcs)
     if isinstance(rule, str) and rule != "natural":
         frequency = _by_rule(requirement, time, rule, natural)
     return requirement.release(time, frequency)
@@ -138,17 +140,37 @@ class _Times:
     # Times of flight at one frequency, and which of them have feasible ellipses.
 
     def __init__(self, requirement: ReleaseRequirement, frequency: float, natural: float) -> None:
-        self._requirement, self._frequency = requirement, frequency
+        self._requirement = self._allowed = requirement
+        self._frequency = frequency
         self._grid = np.geomspace(SHORTEST / natural, LONGEST / natural, GRID)
         self._slacks = self._slack(self._grid)
+        if not (self._slacks > 0.0).any():
+            self._find_one()
 
-    def of_least_energy(self) -> float:
+    def _find_one(self) -> None:
+        # Between the times of the grid the one with the largest slack may be feasible, or touch the limits.
+        grid, slacks = self._grid, self._slacks
+        for _ in range(PASSES):
+            at = int(slacks.argmax())
+            grid = np.linspace(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)], COARSE_GRID)
+            slacks = self._slack(grid)
+        best = grid[slacks.argmax()][None]
+        for requirement in (self._touching, self._requirement):
+            slack = self._slack(best, requirement)
+            if slack[0] > 0.0:
+                self._allowed, self._grid, self._slacks = requirement, best, slack
+
+    @property
+    def _touching(self) -> ReleaseRequirement:
+        return self._requirement._replace(problem=touchable(self._requirement.problem))
+
+    def of_least_energy(self, before: Turning, arcs: range) -> float:
         # The energy is convex in the time: if its minimum is infeasible, the best time is an end of feasible times.
         lowest, slacks = self._slowest(), self._slacks
-        if self._slack(np.array([lowest]))[0] > 0.0:
+        if self._slack(np.array([lowest]), self._touching)[0] > 0.0:
             return lowest
         feasible = np.flatnonzero(slacks > 0.0)
-        if not len(feasible):
+        if not len(feasible) or len(slacks) == 1:
             return float(self._grid[slacks.argmax()])
         energy = (self._requirement.states(self._grid)[1] ** 2).sum(1)
         at = int(feasible[energy[feasible].argmin()])
@@ -159,7 +181,11 @@ class _Times:
         else:
             outside = max(lowest, grid[grid < inside].max(initial=0.0))
         end = _narrowed(self._slack, inside, outside)
-        return end + INSIDE[0] * (self._middle(at) - end)
+        time = end + INSIDE[0] * (self._middle(at) - end)
+        problem, turns, scene = self._requirement.problem, self._requirement.turns, self._requirement.scene
+        fixed, release = arcs.start if len(arcs) == 1 else 0, self._requirement.release(time, self._frequency)
+        transfer = smallest_transfer(problem, before, release, turns, scene, arcs=fixed, max_arcs=arcs.stop - 1)
+        return self._touched(before, time, end, transfer.arcs) if transfer.proof.is_feasible else time
 
     def of_earliest_landing(self, before: Turning, arcs: range) -> float:
         # Fewer arcs take less time, but are feasible only for slower releases.
@@ -170,15 +196,15 @@ class _Times:
         grid = self._grid[feasible[np.unique(np.linspace(0, len(feasible) - 1, COARSE_GRID).astype(int))]]
         for number in arcs:
             duration = float(self._transfer(before, float(grid[0]), number).duration())
-            time = self._earliest(before, grid[grid + duration < landing], number)
-            if time is not None:
-                best, landing = time, time + duration
-        return self.of_least_energy() if best is None else best
+            times = self._earliest(before, grid[grid + duration < landing], number)
+            if times is not None:
+                best, landing = (*times, number), times[0] + duration
+        return self.of_least_energy(before, arcs) if best is None else self._touched(before, *best)
 
-    def _earliest(self, before: Turning, grid: np.ndarray, number: int) -> float | None:
-        # The shortest time of flight whose transfer, with this number of arcs, is proved.
+    def _earliest(self, before: Turning, grid: np.ndarray, number: int) -> tuple[float, float] | None:
+        # The shortest time of flight whose transfer, with this number of arcs, is proved, and the end of such times.
         def slack(times: np.ndarray) -> np.ndarray:
-            problem, scene = self._requirement.problem, self._requirement.scene
+            problem, scene = self._allowed.problem, self._allowed.scene
             proofs = [sampled_proof(problem, self._transfer(before, t, number), scene, SAMPLES) for t in times.tolist()]
             slacks = np.array([(proof.proof.high / proof.scales).min() for proof in proofs])
             return np.minimum(slacks, self._slack(times))
@@ -195,16 +221,34 @@ class _Times:
             if not proof_of(
                 self._requirement.problem, self._transfer(before, time, number), self._requirement.scene
             ).verdict:
-                return time
+                return time, end
         return None
 
-    def _transfer(self, before: Turning, time: float, number: int) -> Any:
+    def _touched(self, before: Turning, time: float, end: float, number: int) -> float:
+        # A proved time beside an end, or the end itself where limits alone set it: they may be touched.
+        problem, beyond = self._requirement.problem, 2.0 * end - time
+        if problem.limits.uncertainty is not None:
+            return time
+        # Proofs take limits that much wider.
+        limits = jax.tree.map(lambda given, wide: 2.0 * given - wide, problem.limits, self._touching.problem.limits)
+        aimed_at = problem._replace(limits=limits)
+
+        def proof(at: float) -> MotionProof:
+            return proof_of(aimed_at, self._transfer(before, at, number, 1.0), self._requirement.scene, intervals=False)
+
+        outside = proof(beyond)
+        may_touch = np.array([row.allowance > 0.0 for row in outside.criteria])
+        if not ((outside.proof.low > 0.0) | may_touch).all():
+            return time
+        return _narrowed(lambda times: [proof(float(times[0])).is_feasible], time, beyond, PROVED_HALVINGS)
+
+    def _transfer(self, before: Turning, time: float, number: int, more_turns: float = 0.0) -> Any:
         release = self._requirement.release(time, self._frequency)
         problem, turns = self._requirement.problem, self._requirement.turns
-        return motion_between(problem.amplitude, before, release, number, turns)
+        return motion_between(problem.amplitude, before, release, number, turns + more_turns)
 
-    def _slack(self, times: np.ndarray) -> np.ndarray:
-        return self._requirement.slacks(times, np.full(len(times), self._frequency))
+    def _slack(self, times: np.ndarray, requirement: ReleaseRequirement | None = None) -> np.ndarray:
+        return (requirement or self._allowed).slacks(times, np.full(len(times), self._frequency))
 
     def _slowest(self) -> float:
         # The time of flight with the slowest release, by a formula; if the velocity at the target is given, the release
@@ -223,9 +267,9 @@ class _Times:
         return float(self._grid[low + self._slacks[low:high].argmax()])
 
 
-def _narrowed(slack: Callable, inside: float, outside: float) -> float:
+def _narrowed(slack: Callable, inside: float, outside: float, halvings: int = HALVINGS) -> float:
     # The end of the feasible times between a feasible and an infeasible one.
-    for _ in range(HALVINGS):
+    for _ in range(halvings):
         middle = 0.5 * (inside + outside)
         inside, outside = (middle, outside) if slack(np.array([middle]))[0] > 0.0 else (inside, middle)
     return inside

@@ -24,15 +24,16 @@ from cspr_jax.maps.release_box import ReleaseBox
 from cspr_jax.maps.releases import Releases
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 SHORTEST = 0.003  # time of flight, over the longest one
 GRID = 513  # times of flight
 AROUND = 33  # times of each narrower grid about the best one
 NARROWED = 8  # how often
-# Fraction of its slack that an ellipse keeps from the plane of the spools and from the floor.
+# Fraction of the depth of its centre that an ellipse keeps from the plane of the spools.
 KEPT = 1e-6
 # Bound of the rounding of margins.
 MARGIN_ERROR = 1e-13
@@ -71,11 +72,12 @@ class _Cells(NamedTuple):
 
 
 class _Space(NamedTuple):
-    # Normal of the plane of the spools, gravity, box of releases, depth of the floor.
+    # Normal of the plane of the spools, gravity, box of releases, depth of the floor, and by how much it may be missed.
     normal: np.ndarray
     gravity: float
     box: ReleaseBox
     floor: float
+    missed: float
 
 
 class _Samples(NamedTuple):
@@ -96,7 +98,8 @@ def swing_range(
 ) -> SwingRange:
     """Slowest releases from ellipses at their natural frequencies."""
     hull = hull_of(robot)
-    space = _Space(np.asarray(hull.normal), float(robot.gravity), box, np.inf if floor is None else floor)
+    missed = TOUCHED * float(spool_radius(robot))
+    space = _Space(np.asarray(hull.normal), float(robot.gravity), box, np.inf if floor is None else floor, missed)
     depth = _depth(centres, space.normal)
     # Above the spools there is no swing, and any numbers do.
     cells = _Cells(centres, targets, np.where(depth > 0.0, depth, 1.0), np.zeros((len(centres), 1)))
@@ -144,10 +147,11 @@ def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     fallen, fraction = _above(space, cells, times), 1.0 / (cells.frequency * times) ** 2
     # Depths that the box has, and those that ellipses leave.
     corners = np.sort(np.stack([low * normal, high * normal]), axis=0).sum(1)
-    depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners)
-    heights = _interval(
-        cells.centre[:, 2], fallen[..., 2], fraction, space.floor - cells.centre[:, 2], (low[2], high[2])
-    )
+    depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners, cells.depth * (1.0 - KEPT))
+    above = space.floor - cells.centre[:, 2]
+    # A floor may be touched, also by a swing that has no other height.
+    inner = np.where(above > space.missed, above, above + space.missed)
+    heights = _interval(cells.centre[:, 2], fallen[..., 2], fraction, above, (low[2], high[2]), inner)
     first, last = (np.broadcast_to(side, fallen.shape).copy() for side in (low, high))
     first[..., 2], last[..., 2] = np.maximum(low[2], heights.low), np.minimum(high[2], heights.high)
     position = _nearest(fallen, first, last, normal, depths)
@@ -155,8 +159,8 @@ def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     rounding = KEPT * 1e-3 * cells.depth[:, None]
     is_in = (depth > depths.low - rounding) & (depth < depths.high + rounding) & (first[..., 2] <= last[..., 2])
     speed = np.sqrt(((fallen - position) ** 2).sum(-1)) / times
-    above = np.where(np.isinf(space.floor), np.inf, heights.slack / cells.depth[:, None])
-    return _Samples(position, np.where(is_in, speed, np.inf), depths.slack / cells.depth[:, None], above)
+    clear = np.where(np.isinf(space.floor), np.inf, heights.slack / cells.depth[:, None])
+    return _Samples(position, np.where(is_in, speed, np.inf), depths.slack / cells.depth[:, None], clear)
 
 
 class _Interval(NamedTuple):
@@ -166,10 +170,12 @@ class _Interval(NamedTuple):
     slack: np.ndarray
 
 
-def _interval(centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, radius: np.ndarray, box) -> _Interval:
-    # The p for which (p - centre)^2 + fraction (fallen - p)^2 stays below the square of the radius.
+def _interval(
+    centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, radius: np.ndarray, box, inner: np.ndarray
+) -> _Interval:
+    # The p for which (p - centre)^2 + fraction (fallen - p)^2 is at most the square of the inner radius.
     middle = (centre[:, None] + fraction * fallen) / (1.0 + fraction)
-    away, inner = fallen - centre[:, None], radius[:, None] * (1.0 - KEPT)
+    away, inner = fallen - centre[:, None], inner[:, None]
     square = inner**2 / (1.0 + fraction) - fraction * away**2 / (1.0 + fraction) ** 2
     half = np.where(inner > 0.0, np.sqrt(np.where(square >= 0.0, square, np.nan)), np.nan)
     best = np.clip(middle, *box)
@@ -209,13 +215,20 @@ def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
     drop = np.maximum((_depth(cells.target, space.normal) - top) / cells.depth, 0.0)
     longest = 1.0 + np.sqrt(1.0 + 2.0 * drop)
     times = np.geomspace(SHORTEST, 1.0, GRID) * longest[:, None] / cells.frequency
+    has_floor = np.isfinite(space.floor)
+    if has_floor:
+        # Just above the floor swings are level, and the object falls from there: all other times may be infeasible.
+        level = np.sqrt(2.0 * np.maximum(cells.target[:, 2] - cells.centre[:, 2], 0.0) / space.gravity)[:, None]
+        times = np.sort(np.append(times, np.where(level > 0.0, level, times[:, :1]), axis=1), axis=1)
     samples, each = _sampled(space, cells, times), np.arange(len(drop))
     at = np.minimum(samples.below, samples.above).argmax(1)
     below, above = samples.below[each, at], samples.above[each, at]
     for _ in range(NARROWED):
         best = samples.speed.argmin(1)
-        first, last = (times[each, np.clip(best + step, 0, times.shape[1] - 1)] for step in (-1, 1))
+        known, step = times[each, best][:, None], 1 + has_floor
+        first, last = (times[each, np.clip(best + side, 0, times.shape[1] - 1)] for side in (-step, step))
         times = np.linspace(first, last, AROUND, axis=1)
+        times = np.sort(np.append(times, known, axis=1), axis=1) if has_floor else times
         samples = _sampled(space, cells, times)
     best = samples.speed.argmin(1)
     return times[each, best], samples.position[each, best], samples.speed[each, best], below, above

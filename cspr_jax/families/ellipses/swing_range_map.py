@@ -47,8 +47,10 @@ class SwingRangeMap(ReleasesMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, speed = answers["verdict"] == 0, answers["release_speed"]
+        has_floor = self._problem.limits.floor is not None
         return {
-            "a feasible cell with a margin below zero": feasible & ~(answers["largest_margin"] > 0.0),
+            "a feasible cell with a margin below zero": feasible
+            & ~(answers["largest_margin"] > -self._missed * has_floor),
             "a feasible cell without a launch": feasible & ~((speed >= 0.0) & (answers["flight_time"] > 0.0)),
             "an infeasible cell with a launch": ~feasible
             & np.logical_or.reduce([np.isfinite(answers[name]) for name in _OF_SWINGS]),
