@@ -215,7 +215,7 @@ def merit(tasks, name, unknowns, barrier, soft):
 def test_steps_go_down_the_merit_of_each_objective(searched, name):
     """The slope that a step tells is that of the merit, written out here; without multipliers errors are no less."""
     tasks, unknowns = searched
-    limits = ValueBounds(tasks.low[0, 0, 0, 0], tasks.high[0, 0, 0, 0], np.zeros(0), np.zeros(0))
+    limits = ValueBounds(tasks.low[0, 0, 0, 0], tasks.high[0, 0, 0, 0], *np.zeros((3, 0)))
     objective, moved_limits = OBJECTIVES[name](limits, 3)
     with double_precision():
         tasks = dataclasses.replace(

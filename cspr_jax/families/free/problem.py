@@ -1,5 +1,7 @@
 """The question of a search: poses, limits, and what the motion is to be the best in; bounds tighten after a proof."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import NamedTuple
 
@@ -12,6 +14,7 @@ from cspr_jax.families.free.search.equations import ValueBounds, bounds, coordin
 from cspr_jax.families.free.search.objectives import OBJECTIVES, Objective
 from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Bool
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
@@ -66,7 +69,7 @@ class FreeQuestion:
     settings: FreeSettings
 
     @classmethod
-    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "FreeQuestion":
+    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> FreeQuestion:
         """Take limits from the robot, and the objective from the settings."""
         check_searched(problem)
         robot = problem.robot
@@ -125,10 +128,17 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
     near = steps.copy()
     near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])
     near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
-    shape = *tasks.low.shape[:3], 1, -1
-    rise, drop = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
     count = tasks.n_limited
     tighter = dataclasses.replace(tasks, low=tasks.low.copy(), high=tasks.high.copy())
-    tighter.low[..., :count] += rise
-    tighter.high[..., :count] -= drop
+    for bound, changes, sign in ((tighter.low, limits.rises, 1.0), (tighter.high, limits.falls, -1.0)):
+        steps = (near[..., None] * changes).max(2).reshape(*bound.shape[:3], 1, -1)
+        bound[..., :count] += sign * np.where(_given(tasks, limits), 0.0, steps)
     return tighter
+
+
+def _given(tasks: Tasks, limits: ValueBounds) -> Bool[np.ndarray, "l s m n n_values"]:
+    # Tell which values poses give, and no motion changes: there limits may be touched.
+    highest = np.where(tasks.is_free, 1, 2)[..., None]
+    given = np.zeros((*tasks.low.shape[:4], len(limits.orders)), bool)
+    given[:, :, 0, 0], given[:, :, -1, -1] = (limits.orders <= side for side in (highest[:, :-1], highest[:, 1:]))
+    return given

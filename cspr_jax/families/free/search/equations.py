@@ -31,6 +31,8 @@ from cspr_jax.verification.criteria import BELOW, Criterion, pose_conditions
 BATCH = 128
 # Entries of x after the coordinates and their derivatives.
 SCALARS = 2
+# Derivatives of the pose on which quantities depend.
+ORDERS = {"depth": 0, "length": 0, "speed": 1, "mass_centre_speed": 1, "acceleration": 2, "mass_centre_acceleration": 2}
 # Smallest depth below the plane of the spools, over the robot's radius, that a search allows.
 DEPTH = 0.02
 
@@ -104,6 +106,7 @@ class ValueBounds(NamedTuple):
         high: (n_values,) inf for none.
         rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
         falls: (n_criteria, n_values) by how much an upper bound falls.
+        orders: (n_values,) up to which derivative of the pose a value depends on it, 3 where it does on tensions, too.
         determinant: index of the value that is the determinant; None without one.
         depth: index of the value that is the depth below the plane of the spools, over the robot's radius; None
             without such a plane.
@@ -113,18 +116,20 @@ class ValueBounds(NamedTuple):
     high: np.ndarray
     rises: np.ndarray
     falls: np.ndarray
+    orders: np.ndarray
     determinant: int | None = None
     depth: int | None = None
 
 
 class _Value(NamedTuple):
-    # A value: its bounds, their criteria, its cable or -1, and how much it changes when the slack grows by 1.
+    # A value: its bounds, their criteria, its cable or -1, how much it changes when the slack grows by 1, its order.
     low: float
     high: float
     low_flag: Verdict
     high_flag: Verdict
     cable: int
     change: float
+    order: int
 
 
 def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_timed: bool = False) -> ValueBounds:
@@ -133,7 +138,9 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     infeasible, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
     low, high = (np.asarray(side) / weight for side in tension_range(robot, limits))
     slack, over = Verdict.SLACK_CABLE | infeasible, Verdict.OVER_TENSION | infeasible
-    values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight) for k in numbers]
+    # Redundant cables leave tensions open.
+    order = 2 if robot.n_cables == robot.dof else 3
+    values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight, order) for k in numbers]
     for limit in other_limits(limits):
         allowed = np.broadcast_to(getattr(limits, limit.name), robot.n_cables if limit.per_cable else 1)
         for k, maximum in enumerate(allowed):
@@ -141,17 +148,18 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
             change = 1.0 / radius if limit.is_height else (2.0 if limit.of_mass_centre else 1.0) / maximum
             top = maximum / radius if limit.is_height else 1.0
             bottom = -1.0 if limit.quantity in ("speed", "acceleration") else -np.inf
-            values.append(_Value(bottom, top, limit.flag, limit.flag, k if limit.per_cable else -1, change))
+            cable = k if limit.per_cable else -1
+            values.append(_Value(bottom, top, limit.flag, limit.flag, cable, change, ORDERS[limit.quantity]))
     is_regular, _ = pose_conditions(robot)
     is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
         minimum = DEPTH if is_divided else -np.inf
-        values.append(_Value(minimum, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / radius))
+        values.append(_Value(minimum, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / radius, 0))
     if is_timed:
-        values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
+        values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0, 3))
     if is_regular:
         # The determinant keeps its sign at the poses: `poses.tasks_of` sets that bound, as it does for the depth.
-        values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0))
+        values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0, 0))
 
     def changes(side: str, bound: str) -> np.ndarray:
         return np.array(
@@ -172,4 +180,5 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     index_of = {value.low_flag: k for k, value in enumerate(values)}
     depth = index_of.get(Verdict.ABOVE_SPOOLS) if is_divided else None
     sides = changes("low_flag", "low"), changes("high_flag", "high")
-    return ValueBounds(low, high, *sides, determinant=index_of.get(Verdict.SINGULAR), depth=depth)
+    orders = np.array([value.order for value in values])
+    return ValueBounds(low, high, *sides, orders, determinant=index_of.get(Verdict.SINGULAR), depth=depth)
