@@ -1,11 +1,15 @@
 """Limits that are touched are kept, by every proof of every family; slack cables are not."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 import cspr_jax
+from cspr_jax.errors import ConfigError
 from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.model.limits import Limits
@@ -15,11 +19,13 @@ from cspr_jax.verification.proved_answers import proof_of
 BASE = np.array([[0.22516660498395405, -0.13, 0.0], [-0.22516660498395405, -0.13, 0.0], [0.0, 0.26, 0.0]])
 MASS, GRAVITY = 0.198, 9.81
 SMALL = 1e-6
+EXAMPLES = 6
 # Columns of the reports that have the extremes of what limits bound.
 COLUMNS = {row.name: row.name for row in LIMITS} | {"floor": "z_lowest"}
 FLAGS = {row.name: row.flag.text for row in LIMITS}
 FOUR = {"name": "four", "base_points": [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], "mass": 1.0}
-PULLEYS = {"name": "small pulleys", "base_points": BASE.tolist(), "mass": MASS, "pulley_radius": 1e-6}
+PROTOTYPE = {"name": "three", "base_points": BASE.tolist(), "mass": MASS}
+PULLEYS = PROTOTYPE | {"name": "small pulleys", "pulley_radius": 1e-6}
 SWING = {"z0": 1.4, "pose": [{"rest": True}, {"position": [0.3, 0.2, 1.5]}]}
 WAY = [{"position": [0.0, 0.0, 1.4]}, {"position": [0.1, 0.05, 1.5]}]
 VIA = [
@@ -77,30 +83,94 @@ def with_arcs(keys: dict, bare) -> dict:
     return {"pose": [keys["pose"][0], keys["pose"][1] | {"arcs": arcs}]} if arcs else {}
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", families(MOTIONS))
-def test_motions_that_reach_a_limit_are_feasible(name):
-    """At each limit, to rounding; a millionth beyond it they are refused, by this limit alone."""
-    keys = {"family": name, **MOTIONS[name]}
+def check_touched(keys: dict, names: Sequence[str], checked: Sequence[str]) -> None:
+    """A motion reaches limits, to rounding; a millionth beyond one it is refused, by this limit alone."""
     bare = planned(keys)
+    assume(bare.feasible)
     robot = bare.robot_file
     segments, keys = bare.to_dict()["segments"], keys | with_arcs(keys, bare)
     values = {}
-    for limit, column in COLUMNS.items():
-        each = [segment[column] for segment in segments]
+    for limit in names:
+        each = [segment[COLUMNS[limit]] for segment in segments]
         lowest = limit == "tension_min" or (limit == "floor" and robot.z_axis == "up")
         values[limit] = min(each) if lowest else max(each)
-    if name in REDUNDANT:
-        del values["tension_min"], values["tension_max"]
     loose = {limit: beside(limit, value, robot, -0.1) for limit, value in values.items()}
     assert planned(keys, **loose).feasible
-    for limit, value in values.items():
+    for limit in checked:
+        value = values[limit]
         for fraction in (-SMALL, 0.0):
             found = planned(keys, **loose | {limit: beside(limit, value, robot, fraction)})
             assert found.feasible, (limit, fraction, [row["cause"] for row in found.to_dict()["segments"]])
         refused = planned(keys, **loose | {limit: beside(limit, value, robot, SMALL)}).to_dict()["segments"]
         flags = {row["verdict"].removeprefix("no_arcs+").removesuffix("+no_arcs") for row in refused}
         assert flags - {"feasible"} == {FLAGS[limit]}, (limit, flags)
+
+
+def limits_of(name: str) -> list[str]:
+    """Limits that one number of a motion's report reaches: not the tensions of redundant cables."""
+    return [limit for limit in COLUMNS if name not in REDUNDANT or not limit.startswith("tension")]
+
+
+@THOROUGH
+@pytest.mark.parametrize("name", families(MOTIONS))
+def test_motions_that_reach_a_limit_are_feasible(name):
+    """Each limit of each family."""
+    check_touched({"family": name, **MOTIONS[name]}, *[limits_of(name)] * 2)
+
+
+def moved(keys: dict, rng: np.random.Generator) -> dict:
+    """A plan with other positions, ellipses and spools nearby."""
+
+    def nearby(points):
+        return (np.asarray(points, float) + rng.uniform(-0.03, 0.03, np.shape(points))).tolist()
+
+    poses = [pose | ({"position": nearby(pose["position"])} if "position" in pose else {}) for pose in keys["pose"]]
+    changed = keys | {"pose": poses}
+    robot = PROTOTYPE if keys["robot"] == "prototype" else keys["robot"]
+    if isinstance(robot, dict):
+        level = np.array([1.0, 1.0, 0.0])
+        spools = np.asarray(robot["base_points"]) + level * rng.uniform(-0.03, 0.03, (len(robot["base_points"]), 3))
+        # About their centroid, below which P0 is.
+        changed["robot"] = robot | {"base_points": (spools - spools.mean(0)).tolist(), "mass": rng.uniform(0.1, 2.0)}
+    if "ellipse" in keys:
+        sizes = {"radius": rng.uniform(0.1, 0.25), "frequency": rng.uniform(2.0, 2.8)}
+        changed["ellipse"] = keys["ellipse"] | {"centre": nearby(keys["ellipse"]["centre"])} | sizes
+    return changed
+
+
+@pytest.mark.ci("spline", "ellipse", "bezier", "hypocycloid-standard", "redundant bezier")
+@THOROUGH
+@pytest.mark.parametrize("name", MOTIONS)
+@given(seed=st.integers(0, 2**16), data=st.data())
+@settings(max_examples=EXAMPLES)
+def test_random_motions_that_reach_a_limit_are_feasible(name, seed, data):
+    """Of other robots, between other positions, at limits that are drawn."""
+    limit = data.draw(st.sampled_from(limits_of(name)))
+    check_touched(moved({"family": name, **MOTIONS[name]}, np.random.default_rng(seed)), limits_of(name), [limit])
+
+
+@pytest.mark.ci("s-curve", "quintic")
+@THOROUGH
+@pytest.mark.parametrize("family", ["s-curve", "quintic", "path", "free"])
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=EXAMPLES)
+def test_the_fastest_motions_to_the_floor(family, seed):
+    """Of families that choose their time, from above to a drawn target: at a floor that it is on, not below it."""
+    rng = np.random.default_rng(seed)
+    start, target = (rng.uniform([-0.05, -0.05, low], [0.05, 0.05, low + 0.15]) for low in (1.2, 1.36))
+    keys = {"family": family, "robot": PROTOTYPE, "pose": [{"position": start}, {"position": target}]}
+    keys |= {"max_acceleration": 1.0} if family == "s-curve" else {}
+    robot = cspr_jax.load_robot("prototype")
+    for fraction in (-SMALL, 0.0):
+        found = planned(keys, tension_max=3.0, floor=beside("floor", target[2], robot, fraction))
+        assert found.feasible, (fraction, found.to_dict()["segments"][0]["cause"])
+    floor = beside("floor", target[2], robot, SMALL)
+    if family == "free":
+        with pytest.raises(ConfigError, match="floor"):
+            planned(keys, tension_max=3.0, floor=floor)
+    else:
+        (refused,) = planned(keys, tension_max=3.0, floor=floor).to_dict()["segments"]
+        assert FLAGS["floor"] in refused["verdict"].split("+")
 
 
 @pytest.mark.parametrize("name", [name for name in REDUNDANT if "platform" not in name])
