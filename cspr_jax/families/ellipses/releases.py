@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from cspr_jax.families.ellipses import harmonics
@@ -226,21 +227,21 @@ class _Times:
 
     def _touched(self, before: Turning, time: float, end: float, number: int) -> float:
         # A proved time beside an end, or the end itself where limits alone set it: they may be touched.
-        problem, beyond = self._requirement.problem, 2.0 * end - time
+        problem, mirrored = self._requirement.problem, 2.0 * end - time
         if problem.limits.uncertainty is not None:
             return time
         # Proofs take limits that much wider.
-        limits = jax.tree.map(lambda given, wide: 2.0 * given - wide, problem.limits, self._touching.problem.limits)
+        limits = jax.tree.map(lambda limit, wide: 2.0 * limit - wide, problem.limits, self._touching.problem.limits)
         aimed_at = problem._replace(limits=limits)
 
         def proof(at: float) -> MotionProof:
             return proof_of(aimed_at, self._transfer(before, at, number, 1.0), self._requirement.scene, intervals=False)
 
-        outside = proof(beyond)
+        outside = proof(mirrored)
         may_touch = np.array([row.allowance > 0.0 for row in outside.criteria])
         if not ((outside.proof.low > 0.0) | may_touch).all():
             return time
-        return _narrowed(lambda times: [proof(float(times[0])).is_feasible], time, beyond, PROVED_HALVINGS)
+        return _narrowed(lambda times: [proof(float(times[0])).is_feasible], time, mirrored, PROVED_HALVINGS)
 
     def _transfer(self, before: Turning, time: float, number: int, more_turns: float = 0.0) -> Any:
         release = self._requirement.release(time, self._frequency)

@@ -148,10 +148,10 @@ def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     # Depths that the box has, and those that ellipses leave.
     corners = np.sort(np.stack([low * normal, high * normal]), axis=0).sum(1)
     depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners, cells.depth * (1.0 - KEPT))
-    above = space.floor - cells.centre[:, 2]
+    height = space.floor - cells.centre[:, 2]
     # A floor may be touched, also by a swing that has no other height.
-    inner = np.where(above > space.missed, above, above + space.missed)
-    heights = _interval(cells.centre[:, 2], fallen[..., 2], fraction, above, (low[2], high[2]), inner)
+    inner = np.where(height > space.missed, height, height + space.missed)
+    heights = _interval(cells.centre[:, 2], fallen[..., 2], fraction, height, (low[2], high[2]), inner)
     first, last = (np.broadcast_to(side, fallen.shape).copy() for side in (low, high))
     first[..., 2], last[..., 2] = np.maximum(low[2], heights.low), np.minimum(high[2], heights.high)
     position = _nearest(fallen, first, last, normal, depths)
@@ -225,10 +225,10 @@ def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
     below, above = samples.below[each, at], samples.above[each, at]
     for _ in range(NARROWED):
         best = samples.speed.argmin(1)
-        known, step = times[each, best][:, None], 1 + has_floor
+        best_time, step = times[each, best][:, None], 1 + has_floor
         first, last = (times[each, np.clip(best + side, 0, times.shape[1] - 1)] for side in (-step, step))
         times = np.linspace(first, last, AROUND, axis=1)
-        times = np.sort(np.append(times, known, axis=1), axis=1) if has_floor else times
+        times = np.sort(np.append(times, best_time, axis=1), axis=1) if has_floor else times
         samples = _sampled(space, cells, times)
     best = samples.speed.argmin(1)
     return times[each, best], samples.position[each, best], samples.speed[each, best], below, above

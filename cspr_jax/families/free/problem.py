@@ -139,6 +139,6 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
 def _given(tasks: Tasks, limits: ValueBounds) -> Bool[np.ndarray, "l s m n n_values"]:
     # Tell which values poses give, and no motion changes: there limits may be touched.
     highest = np.where(tasks.is_free, 1, 2)[..., None]
-    given = np.zeros((*tasks.low.shape[:4], len(limits.orders)), bool)
-    given[:, :, 0, 0], given[:, :, -1, -1] = (limits.orders <= side for side in (highest[:, :-1], highest[:, 1:]))
-    return given
+    is_given = np.zeros((*tasks.low.shape[:4], len(limits.orders)), bool)
+    is_given[:, :, 0, 0], is_given[:, :, -1, -1] = (limits.orders <= side for side in (highest[:, :-1], highest[:, 1:]))
+    return is_given
