@@ -132,12 +132,12 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
     tighter = dataclasses.replace(tasks, low=tasks.low.copy(), high=tasks.high.copy())
     for bound, changes, sign in ((tighter.low, limits.rises, 1.0), (tighter.high, limits.falls, -1.0)):
         steps = (near[..., None] * changes).max(2).reshape(*bound.shape[:3], 1, -1)
-        bound[..., :count] += sign * np.where(_given(tasks, limits), 0.0, steps)
+        bound[..., :count] += sign * np.where(_fixed_by_poses(tasks, limits), 0.0, steps)
     return tighter
 
 
-def _given(tasks: Tasks, limits: ValueBounds) -> Bool[np.ndarray, "l s m n n_values"]:
-    # Tell which values poses give, and no motion changes: there limits may be touched.
+def _fixed_by_poses(tasks: Tasks, limits: ValueBounds) -> Bool[np.ndarray, "l s m n n_values"]:
+    # Tell which values poses fix, and no motion changes: there limits may be touched.
     highest = np.where(tasks.is_free, 1, 2)[..., None]
     is_given = np.zeros((*tasks.low.shape[:4], len(limits.orders)), bool)
     is_given[:, :, 0, 0], is_given[:, :, -1, -1] = (limits.orders <= side for side in (highest[:, :-1], highest[:, 1:]))
