@@ -3,6 +3,7 @@
 A linear program asks for the tensions themselves and knows of no face.
 """
 
+import jax
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -123,6 +124,12 @@ def test_normals_are_determinants():
                 assert normal @ matrix[:, k] == pytest.approx(wanted, abs=1e-13)
 
 
+@jax.jit
+def FACES_AND_MARGIN(matrix, low, high, wrench):
+    faces = wrench_faces(matrix, low, high)
+    return faces, faces.margin(wrench)
+
+
 @pytest.mark.quick("7")
 @pytest.mark.parametrize("count", [6, 7, 8])
 def test_wrenches_of_six_components(count):
@@ -132,12 +139,12 @@ def test_wrenches_of_six_components(count):
         matrix = rng.normal(size=(6, count))
         matrix /= np.linalg.norm(matrix, axis=0)
         low, high = np.zeros(count), np.full(count, np.inf if i % 2 else 2.0)
-        faces = wrench_faces(matrix, low, high)
         wrench = matrix @ rng.uniform(-0.4, 1.5, count)
+        faces, margin = FACES_AND_MARGIN(matrix, low, high, wrench)
         status = linprog(
             np.zeros(count), A_eq=matrix, b_eq=wrench, bounds=[(0.0, None if i % 2 else 2.0)] * count, method="highs"
         ).status
-        assert abs(faces.margin(wrench)) > 1e-6 and (faces.margin(wrench) > 0.0) == (status == 0)
+        assert abs(float(margin)) > 1e-6 and (float(margin) > 0.0) == (status == 0)
         if not i % 2:
             corners = np.asarray(matrix) @ rng.choice([0.0, 2.0], (count, 40))
             slack = np.array([faces.slacks(corner) for corner in corners.T])
@@ -303,13 +310,14 @@ def test_the_map(tmp_path, limits):
 def test_wrench_closure():
     """Eight spools around a mass close every force; four above do not, three in a plane around it do."""
     corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-    closed = wrench_faces((corners / np.sqrt(3.0)).T, np.zeros(8), np.full(8, np.inf))
+    cube = (corners / np.sqrt(3.0)).T, np.zeros(8), np.full(8, np.inf)
+    closed, margin = jax.tree.map(np.asarray, FACES_AND_MARGIN(*cube, np.array([1.0, 2.0, 3.0])))
     assert closed.closure > 0.3 and closed.is_regular and not np.isfinite(closed.offsets).any()
-    assert np.isinf(closed.margin(np.array([1.0, 2.0, 3.0])))
+    assert np.isinf(margin)
     above = corners[corners[:, 2] > 0.0] / np.sqrt(3.0)
-    assert wrench_faces(above.T, np.zeros(4), np.full(4, np.inf)).closure < 0.0
+    assert float(wrench_faces(above.T, np.zeros(4), np.full(4, np.inf)).closure) < 0.0
     triangle = np.array([[np.cos(a), np.sin(a)] for a in (0.1, 2.2, 4.3)])
-    assert wrench_faces(triangle.T, np.zeros(3), np.full(3, np.inf)).closure > 0.0
+    assert float(wrench_faces(triangle.T, np.zeros(3), np.full(3, np.inf)).closure) > 0.0
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from support.platforms import MSSM, Z0, made, ours, random_pose
@@ -86,7 +85,7 @@ def excess(motion, rng, width, count=64):
     end = start + width * time
     bands = jax.tree.map(np.asarray, motion.bounds(start, end))
     instants = 0.5 * (start + end)[:, None] + 0.5 * (end - start)[:, None] * S
-    found = states(motion, jnp.clip(instants / time, 0.0, 1.0).ravel())
+    found = states(motion, np.clip(instants / time, 0.0, 1.0).ravel())
     worst, radii = -np.inf, []
     for name, band in bands._asdict().items():
         value = getattr(found, name)
