@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from support.reading import read_here
 
 from cspr_jax.outputs.plots.style.colours import NONE_COLOUR, scale_of
+from cspr_jax.outputs.plots.style.fitting import FEWER_TICKS, thin_ticks
 from cspr_jax.store.files.netcdf import make_datasets, new_hdf5
 from outputs.test_outputs import cspr, panels
 
@@ -345,6 +346,24 @@ def test_size_resolution_and_letters(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda self, *args, **options: drawn.append(self))
     cspr(capsys, "plot", path, "--font-size", "7")
     assert {text.get_fontsize() for text in (panels(drawn[0])[0].title, panels(drawn[0])[-1].xaxis.label)} == {7.0}
+
+
+def test_numbers_of_ticks_do_not_meet(monkeypatch):
+    """In all panels; where they do not meet, one layout tells for as many panels as there are."""
+    figure, layouts, lay_out = Figure(figsize=(6.0, 2.0), layout="constrained"), [], Figure.draw_without_rendering
+    monkeypatch.setattr(Figure, "draw_without_rendering", lambda self: layouts.append(lay_out(self)))
+    drawn = figure.subplots(1, 3, width_ratios=(1, 2, 1))
+    for panel in drawn:
+        panel.set_xlim(1000.5, 1001.5)
+    thin_ticks(figure)
+    for panel in drawn:
+        shown = [tick for tick in panel.xaxis.get_major_ticks() if 1000.5 <= tick.get_loc() <= 1001.5]
+        boxes = [tick.label1.get_window_extent() for tick in shown]
+        assert len(boxes) >= 2 and not any(one.overlaps(other) for one, other in itertools.pairwise(boxes))
+    assert 1 < len(layouts) <= len(FEWER_TICKS)
+    layouts.clear()
+    thin_ticks(figure)
+    assert len(layouts) == 1
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,8 @@ def test_speeds_at_the_ends():
     speeds = np.linalg.norm(result.rows()["velocity"], axis=1)
     middle = int(np.argmin(np.linalg.norm(walked(result) - PLACES[2], axis=1)))
     assert speeds[[0, middle, -1]] == pytest.approx([0.05, 0.0, 0.08], abs=1e-9)
+    last = result.to_dict()["segments"][-1]
+    assert 0.9 * last["duration"] < last["lower_bound"] <= last["duration"]
     loop = {"kind": "quintic", "closed": True, "points": PLACES[1:], "grid": 50}
     back = cspr_jax.plan(ROBOT | {"pose": [{"position": PLACES[0]}, {"path": loop}]})
     np.testing.assert_allclose(walked(back)[[0, -1]], [PLACES[0], PLACES[0]], atol=1e-12)
