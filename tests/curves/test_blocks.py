@@ -11,12 +11,6 @@ S = np.linspace(-1.0, 1.0, 33)
 NAMES = ("position", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def excess(seed: int, degree: int, count: int) -> dict[str, tuple[float, float]]:
     """How far each field leaves its band in blocks of one length, over its size, and the largest radius."""
     spline, table = random_spline(seed, degree=degree)

@@ -2,7 +2,6 @@
 
 import inspect
 
-import jax
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, make_interp_spline
@@ -13,12 +12,6 @@ from cspr_jax.errors import InputError
 
 TIMES = np.array([1.0, 1.7, 2.0, 3.1, 3.5, 4.4])
 PLACES = np.random.default_rng(3).normal(size=(6, 3))
-
-
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
 
 
 def values(spline, times):

@@ -1,6 +1,5 @@
 """Splines of what was read: curves of SciPy exactly, tables by their interpolation, long tables window by window."""
 
-import jax
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly, BSpline, CubicSpline, PchipInterpolator, make_interp_spline
@@ -14,12 +13,6 @@ from cspr_jax.errors import InputError
 
 TIMES = np.array([0.0, 0.5, 1.2, 2.0, 3.3])
 VALUES = np.random.default_rng(0).normal(size=(5, 7))
-
-
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
 
 
 def states(spline, count=41):

@@ -9,12 +9,6 @@ from scipy.spatial.transform import Rotation
 from support.splines import random_spline, states_of
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 @pytest.mark.parametrize("degree", [3, 5])
 def test_states_are_those_of_scipy(degree):
     for seed in range(5):

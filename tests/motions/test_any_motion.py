@@ -3,7 +3,6 @@
 import dataclasses
 from functools import partial
 
-import jax
 import numpy as np
 import pytest
 from oracles import any_motion
@@ -34,12 +33,6 @@ NAMES = {
 }
 # Ends of intervals agree to this, s; the margin lies within its bounds but for this share of a criterion's size.
 TIME, SHARE = 1e-6, 1e-7
-
-
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
 
 
 def robot_of(case):

@@ -26,12 +26,6 @@ EFFECTIVE, SMOOTH = amplitudes.named("effective", 0.15), amplitudes.named("effec
 S = np.linspace(-1.0, 1.0, 17)
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def line(law, rng):
     law = s_curve(rng.uniform(0.2, 0.8)) if law == "s-curve" else fixed_law(law)
     return TimedLine(rng.normal(size=3), rng.normal(size=3), law, as_float64(rng.uniform(0.5, 5.0)))

@@ -29,12 +29,6 @@ from cspr_jax.verification.time_proof import time_proof
 COUNT = 12
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def problem_of(**numbers) -> Problem:
     robot = centred(cspr_jax.load_robot("prototype"))[0]
     return Problem(

@@ -42,12 +42,6 @@ SAMPLES = 4001
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def case(name: str, seed: int, wheels: float = 0.0):
     robot = cspr_jax.load_robot(name)
     if wheels:

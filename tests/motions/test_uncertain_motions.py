@@ -28,12 +28,6 @@ CASES = {
 SPOOLS, CENTRE, FACTOR = 0.003, 0.005, 1.02
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def case(name, seed, **more):
     middle, size, tilt, limits = CASES[name]
     robot = centred(cspr_jax.load_robot(name))[0]

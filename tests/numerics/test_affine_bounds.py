@@ -11,12 +11,6 @@ from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 S = np.linspace(-1.0, 1.0, 401, dtype=np.longdouble)
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def functions(seed: int, width: float, count: int = 3, *, parabolas: bool = False):
     """Random positive functions over s, (401, count), and bounds of them; the band is touched."""
     rng = np.random.default_rng(seed)

@@ -27,8 +27,7 @@ def test_ways_are_those_of_the_kernels(axes):
     units = np.broadcast_to([0.0, 0.0, 1.0] if axes is None else axes, (3, 3))
     units = units / np.linalg.norm(units, axis=1, keepdims=True)
     exits_to = jax.jit(jax.vmap(lambda target: exits(np.array(BASE), units, np.array(RADII), target)))
-    with jax.enable_x64(True):
-        way = jax.tree.map(np.asarray, exits_to(attached))
+    way = jax.tree.map(np.asarray, exits_to(attached))
     np.testing.assert_allclose(ways[:, :, 0], np.broadcast_to(BASE, (50, 3, 3)), atol=1e-12)
     np.testing.assert_allclose(ways[:, :, -2], way.point, atol=1e-12)
     np.testing.assert_array_equal(ways[:, :, -1], attached)

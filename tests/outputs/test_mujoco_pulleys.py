@@ -25,23 +25,22 @@ STEPS = 1000
 
 def scene(pattern: str, name: str, size: float = 0.3):
     """A robot on pulleys and its motion along a spline, in MuJoCo's axes."""
-    with jax.enable_x64(True):
-        world, middle, tilt = upward("down"), (0.1, 0.2, 1.5), 0.0
-        if pattern == "3T":
-            robot = wheels(axes=AXES[name])
-        else:  # all of its cables are taut
-            robot = cspr_jax.with_cables(cspr_jax.load_robot("laval-mssm"), pulley_radius=0.05, pulley_axes=AXES[name])
-            middle, tilt, size = (0.0, 0.0, 1.7), 0.02, 0.1
-        robot = centred(robot)[0]
-        spline, table = random_spline(1, middle=middle, size=size, tilt=tilt, duration=4.0)
+    world, middle, tilt = upward("down"), (0.1, 0.2, 1.5), 0.0
+    if pattern == "3T":
+        robot = wheels(axes=AXES[name])
+    else:  # all of its cables are taut
+        robot = cspr_jax.with_cables(cspr_jax.load_robot("laval-mssm"), pulley_radius=0.05, pulley_axes=AXES[name])
+        middle, tilt, size = (0.0, 0.0, 1.7), 0.02, 0.1
+    robot = centred(robot)[0]
+    spline, table = random_spline(1, middle=middle, size=size, tilt=tilt, duration=4.0)
 
-        @jax.jit
-        @jax.vmap
-        def states(tau):
-            state = spline.state(tau)
-            return state, cables.tensions(robot, state)
+    @jax.jit
+    @jax.vmap
+    def states(tau):
+        state = spline.state(tau)
+        return state, cables.tensions(robot, state)
 
-        state, tension = jax.tree.map(np.asarray, states(jnp.linspace(0.0, 1.0, 2 * STEPS + 1)))
+    state, tension = jax.tree.map(np.asarray, states(jnp.linspace(0.0, 1.0, 2 * STEPS + 1)))
     assert pattern == "3T" or (tension > 0.0).all()
     columns = {"position": state.position, "velocity": state.velocity, "acceleration": state.acceleration}
     if pattern != "3T":

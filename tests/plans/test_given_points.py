@@ -3,7 +3,6 @@
 import dataclasses
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -65,19 +64,18 @@ def robot_of(numbers):
 
 def test_cells_of_workspaces_and_the_floor():
     """Origins and mass centres R c apart; the floor is that of the lowest attachment point, or of the mass centre."""
-    with jax.enable_x64(True):
-        robot = robot_of(ROBOT)
-        places, units = np.array([[0.1, 0.05, 1.2], [0.0, 0.0, 1.0]]), np.stack([QUATERNION, [1.0, 0.0, 0.0, 0.0]])
-        turns = Rotation.from_quat(np.roll(units, -1, axis=1))
-        limits = cspr_jax.Limits(floor=1.25)
-        of_origins = RestPoses(robot, {}, None, limits)
-        of_centres = dataclasses.replace(of_origins, of_mass_centre=True)
-        points = np.array([turn.apply([*ROBOT["platform_points"], CENTRE]) for turn in turns])
-        lowest = places[:, 2] + points[..., 2].max(1)
-        margins = of_origins(places, units)["floor_margin"]
-        np.testing.assert_allclose(margins, 1.25 - lowest, atol=1e-12)
-        same = of_centres(places + turns.apply(CENTRE), units)["floor_margin"]
-        np.testing.assert_allclose(same, margins, atol=1e-12)
-        for place, turn, depth in zip(places + turns.apply(CENTRE), turns, lowest, strict=True):
-            state = State(place, np.zeros(3), np.zeros(3), np.asarray(turn.as_matrix()))
-            assert float(lowest_depth(robot, state)) == pytest.approx(depth, abs=1e-12)
+    robot = robot_of(ROBOT)
+    places, units = np.array([[0.1, 0.05, 1.2], [0.0, 0.0, 1.0]]), np.stack([QUATERNION, [1.0, 0.0, 0.0, 0.0]])
+    turns = Rotation.from_quat(np.roll(units, -1, axis=1))
+    limits = cspr_jax.Limits(floor=1.25)
+    of_origins = RestPoses(robot, {}, None, limits)
+    of_centres = dataclasses.replace(of_origins, of_mass_centre=True)
+    points = np.array([turn.apply([*ROBOT["platform_points"], CENTRE]) for turn in turns])
+    lowest = places[:, 2] + points[..., 2].max(1)
+    margins = of_origins(places, units)["floor_margin"]
+    np.testing.assert_allclose(margins, 1.25 - lowest, atol=1e-12)
+    same = of_centres(places + turns.apply(CENTRE), units)["floor_margin"]
+    np.testing.assert_allclose(same, margins, atol=1e-12)
+    for place, turn, depth in zip(places + turns.apply(CENTRE), turns, lowest, strict=True):
+        state = State(place, np.zeros(3), np.zeros(3), np.asarray(turn.as_matrix()))
+        assert float(lowest_depth(robot, state)) == pytest.approx(depth, abs=1e-12)

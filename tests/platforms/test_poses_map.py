@@ -93,8 +93,7 @@ def test_cells_are_plans(tmp_path, start):
         last = f"[[pose]]\nposition = [{at['x']}, {at['y']}, {at['z']}]\n"
         last += f"tilt_torsion = [{at['tilt_azimuth']}, {at['tilt']}, {at['torsion']}]\n"
         (tmp_path / "plan.toml").write_text(head + first + last)
-        with jax.enable_x64(True):
-            answers = planning.plan(tmp_path / "plan.toml").answers
+        answers = planning.plan(tmp_path / "plan.toml").answers
         assert result.data["arcs"][cell] == answers.arcs[0] and result.data["verdict"][cell] == answers.verdict[0]
         for name in ("duration", "margin", "det_margin", "cable_distance"):
             assert result.data[name][cell] == pytest.approx(getattr(answers, name)[0], rel=1e-6, abs=1e-9), name
@@ -244,8 +243,7 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
     text = f'beat = "{beat}"\n' + SHORT.replace("beta_hat = -14.6701\n", "").split("[[pose]]", 1)[0]
     parts = ["rest = true\n", "position = [0.0, 1.2, 1.5]\ntilt_torsion = [1.0, 0.3, 0.1]\n"]
     (tmp_path / "plan.toml").write_text(text + "".join("[[pose]]\n" + part for part in parts))
-    with jax.enable_x64(True):
-        answers = planning.plan(tmp_path / "plan.toml").answers
+    answers = planning.plan(tmp_path / "plan.toml").answers
     assert answers.arcs[0] > 0 and answers.beta_hat[0, 0] == answers.beta_hat[0, 1]
     if beat == "beta_0":
         assert answers.beta_hat[0, 0] == 0.0
@@ -276,13 +274,11 @@ def check_choices(tmp_path):
     totals = []
     for z0 in ("1.4", "1.5", "1.6", '{ choose = "mean" }', '{ choose = "fastest" }'):
         (tmp_path / "plan.toml").write_text(plain.replace("z0 = 1.4", f"z0 = {z0}"))
-        with jax.enable_x64(True):
-            found = planning.plan(tmp_path / "plan.toml")
+        found = planning.plan(tmp_path / "plan.toml")
         totals.append(found.answers.duration.sum() if found.answers.arcs[0] else np.inf)
     assert totals[-1] <= min(totals[:-1]) + 1e-9
     (tmp_path / "plan.toml").write_text(plain.replace("epsilon = 0.1", 'epsilon = "best"'))
-    with jax.enable_x64(True):
-        best = planning.plan(tmp_path / "plan.toml")
+    best = planning.plan(tmp_path / "plan.toml")
     assert best.answers.arcs[0] > 0 and best.answers.duration.sum() <= totals[0] + 1e-9
 
 

@@ -4,7 +4,6 @@ import copy
 import json
 import warnings
 
-import jax
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -142,7 +141,7 @@ def ready(path):
 def outcome(path):
     """Whether a file was refused; any warning, and any error that is not one line, fails."""
     try:
-        with warnings.catch_warnings(), jax.enable_x64(True):
+        with warnings.catch_warnings():
             warnings.simplefilter("error")
             ready(path)
     except CsprError as error:

@@ -27,12 +27,6 @@ S = np.linspace(-1.0, 1.0, 21)
 EXACT = 1e-11
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def moving(rng, corners, half: float):
     """Corners on parabolas over a block of a length of 2 `half`: their bounds, and their places at S."""
     speed, second_derivative = half * rng.normal(size=corners.shape), 0.5 * half**2 * rng.normal(size=corners.shape)

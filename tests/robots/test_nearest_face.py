@@ -12,12 +12,6 @@ from cspr_jax.robots.tensions.tension_distribution import centred
 COUNT = 60
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def balances(dof: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit columns, some of which pull against others, wrenches, and tensions that give them."""
     rng = np.random.default_rng(seed)

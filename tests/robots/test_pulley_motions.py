@@ -28,12 +28,6 @@ MOVED = jax.jit(moved_lengths)
 TENSIONS = jax.jit(cables.tensions)
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 def wheels(pattern="3T", count=3, axes=None, radius=None):
     """A robot with pulleys of several sizes."""
     robot = made(pattern, count)

@@ -28,12 +28,6 @@ ROBOTS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def float64():
-    with jax.enable_x64(True):
-        yield
-
-
 @jax.jit
 def EXACT(robot, spline, taus):
     unit = cables.wrench_units(robot)

@@ -1,6 +1,5 @@
 """Motions of users from whatever file: this program's own are read back as the motion that they were."""
 
-import jax
 import numpy as np
 import pytest
 from plans.test_planning import SHORT
@@ -33,18 +32,17 @@ def test_motions_of_this_program(folder):
     assert (table.z_axis, file.z_axis) == (None, rows.attributes["z_axis"])
     for name in ("times", "positions", "velocities", "accelerations"):
         np.testing.assert_array_equal(getattr(table, name), getattr(file, name))
-    with jax.enable_x64(True):
-        for source in (table, file):
-            spline = spline_of(source)
-            times = rows.axes["t"]
-            after = np.append(np.diff(times) > 0.0, True)  # of two rows of one time, the motion goes on with the later
-            found = states_along(spline, times[after] / times[-1])
-            pairs = {"position": found.position, "velocity": found.velocity, "acceleration": found.acceleration}
-            if source.quaternions is not None:
-                pairs |= {"omega": found.angular_velocity, "omega_dot": found.angular_acceleration}
-            for name, values in pairs.items():
-                expected = rows.data[name][after]
-                np.testing.assert_allclose(values, expected, atol=1e-6 * np.abs(expected).max())
+    for source in (table, file):
+        spline = spline_of(source)
+        times = rows.axes["t"]
+        after = np.append(np.diff(times) > 0.0, True)  # of two rows of one time, the motion goes on with the later
+        found = states_along(spline, times[after] / times[-1])
+        pairs = {"position": found.position, "velocity": found.velocity, "acceleration": found.acceleration}
+        if source.quaternions is not None:
+            pairs |= {"omega": found.angular_velocity, "omega_dot": found.angular_acceleration}
+        for name, values in pairs.items():
+            expected = rows.data[name][after]
+            np.testing.assert_allclose(values, expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_windows_of_this_program(folder):
