@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.soak
 ROOT = Path(__file__).parents[2]
 FAULTS = tomllib.loads(Path(__file__).with_name("planted_faults.toml").read_text("utf-8"))["fault"]
 QUICK, THOROUGH = "not soak and not thorough", "not soak"
@@ -44,6 +43,7 @@ def outcome(folder: Path, marks: str, *names: str) -> int:
     return done.returncode
 
 
+@pytest.mark.prose
 def test_every_text_stands_in_one_place():
     counts = {fault["name"]: len(places(ROOT / "cspr_jax", fault["old"])) for fault in FAULTS}
     gone = {name: count for name, count in counts.items() if count != 1}
@@ -51,6 +51,7 @@ def test_every_text_stands_in_one_place():
     assert len(counts) == len(FAULTS)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("fault", [pytest.param(fault, id=fault["name"]) for fault in FAULTS])
 def test_a_planted_fault_is_seen(copy, fault):
     (path,) = places(copy / "cspr_jax", fault["old"])
@@ -62,6 +63,7 @@ def test_a_planted_fault_is_seen(copy, fault):
         path.write_text(text, "utf-8")
 
 
+@pytest.mark.soak
 def test_without_a_fault_they_pass(copy):
     for marks, is_thorough in ((QUICK, False), (THOROUGH, True)):
         names = {fault["test"] for fault in FAULTS if fault.get("thorough", False) == is_thorough}
