@@ -100,14 +100,14 @@ def test_faces_of_planar_robots(count):
 def test_laws():
     tau = np.linspace(0.0, 1.0, 301)
     for ratio in (0.1, 0.4, 0.5, 0.83):
-        law = law_of(jnp.asarray(ratio))
-        own = derivatives_of(law, jnp.asarray(tau))
+        law = law_of(np.asarray(ratio))
+        own = tuple(map(np.asarray, derivatives_of(law, tau)))
         wanted = oracle.s_curve(tau * 3.0, ratio * 3.0, 3.0)
         for i, (one, other) in enumerate(zip(own, wanted, strict=True)):
             assert np.asarray(one) / 3.0**i == pytest.approx(other, abs=2e-14 / min(ratio, 1 - ratio) ** 2)
         assert np.abs(own[2]).max() <= law.largest[2] and np.max(own[1]) <= law.largest[1]
     for name, function in (("quintic", oracle.quintic), ("cubic", oracle.cubic)):
-        own = derivatives_of(fixed_law(name), jnp.asarray(tau))
+        own = derivatives_of(fixed_law(name), tau)
         for i, (one, other) in enumerate(zip(own, function(tau * 3.0, 3.0), strict=True)):
             assert np.asarray(one) / 3.0**i == pytest.approx(other, abs=1e-14)
 
@@ -230,7 +230,7 @@ def test_verdicts_are_proved(law):
         margin, bound = proved.attained.item(), proved.bound.item()
         assert np.sign(bound) == np.sign(margin)
         slower = jax.vmap(type(motion)(motion.start, motion.direction, motion.law, duration).state)
-        states = slower(jnp.concatenate([jnp.linspace(0.0, 1.0, 4001), jnp.asarray(motion.breaks())]))
+        states = slower(np.concatenate([np.linspace(0.0, 1.0, 4001), motion.breaks()]))
         places, accelerations = frame.outward(np.asarray(states.position)), frame.rotated(states.acceleration)
         sampled = cspr_jax.available_accelerations(robot, places).margin(np.asarray(accelerations)).min()
         assert margin <= sampled + 1e-9 and margin == pytest.approx(sampled, rel=1e-3)

@@ -124,7 +124,7 @@ def test_closed_form_is_the_printed_motion(general):
 
 def test_normalised_pseudotensions(general):
     """The closed form of (2.12) to (2.14) decides every verdict: any robot, any tilt, any labelling."""
-    found, eta = KAPPA(general.segments, QUINTIC, general.p, TAU), ETA(general.segments, QUINTIC, general.p, TAU)
+    found, eta = (np.asarray(f(general.segments, QUINTIC, general.p, TAU)) for f in (KAPPA, ETA))
     for i in range(N):
         _, position, _, acceleration = general.reference(i)
         base, center = general.bases[i], general.center[i]
@@ -198,20 +198,20 @@ def test_nearly_on_one_line(psi):
 
 def test_feasibility_at_infinity(general):
     """(2.55), and its values in Table 2.1: the first answer a planner looks at."""
-    found = INFINITY(general.segments, QUINTIC)
+    found = np.asarray(INFINITY(general.segments, QUINTIC))
     for i in range(N):
         line = general.bases[i], general.starts[i], general.ends[i], general.z0[i]
         wanted = oracle.feasibility_at_infinity(*line, int(general.arcs[i]))
         assert float(found[i]) == pytest.approx(wanted, abs=1e-12)
     points = np.array([(0.7, 0.7, 3), (-1.1, -1.1, 0.5), (-1.1, -0.9, 1.5), (0.8, 0.5, 1.5)])
     printed = INFINITY(Batch(equilateral(0.26), points[:-1], points[1:], 1.7, 2).segments, QUINTIC)
-    np.testing.assert_allclose(printed[:3], [-0.1557, -0.1416, 0.2057], atol=5e-5)
+    np.testing.assert_allclose(np.asarray(printed)[:3], [-0.1557, -0.1416, 0.2057], atol=5e-5)
     overshooting = from_polynomial([0, 0, 0, 10 + 40, -15 - 120, 6 + 120, -40])  # quintic + 40 (t - t^2)^3
     far = np.asarray(INFINITY(general.segments, overshooting)) - 1.0
     radii = [np.linalg.norm(p - general.center, axis=1) for p in (general.starts, general.ends)]
     shape = np.asarray(derivatives(overshooting, np.linspace(0.0, 1.0, 20_001), order=0)[0])
     worst = np.abs(radii[0] + (radii[1] - radii[0]) * shape[:, None]).max(0)  # the largest radius on the way
-    np.testing.assert_allclose(far, (np.asarray(found) - 1.0) * worst / np.maximum(*radii), rtol=1e-7)
+    np.testing.assert_allclose(far, (found - 1.0) * worst / np.maximum(*radii), rtol=1e-7)
 
 
 def test_margins_of_many_arcs_approach_the_limit(general):
