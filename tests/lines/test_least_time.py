@@ -17,7 +17,7 @@ from cspr_jax.families.lines.slacks import line_slacks
 from cspr_jax.families.lines.timed_lines import motions_of, timed_lines
 from cspr_jax.motion.amplitudes import derivatives, named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import in_one_plane
 from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
@@ -250,3 +250,14 @@ def test_verdict_flags_of_answers():
     ends = frame.inward(np.array([[1.0, 20.0, 7.0]] * 2)), frame.inward(np.array([[1.0, 20.0, 12.0], [9.0, 9.0, 9.0]]))
     answers = timed_lines(problem, *ends)
     assert answers.verdict.tolist() == [Verdict.NOT_FINITE.value, 0]
+
+
+@pytest.mark.parametrize("limits", [{"tension_max": jnp.full(4, 80.0)}, {"acceleration_max": jnp.asarray(5.0)}])
+def test_limits_bound_the_acceleration_where_taut_cables_do_not(limits):
+    """A vertical line, along which taut cables alone bound no acceleration upwards."""
+    problem, frame = problem_of(cspr_jax.load_robot("boralugoda-rectangle"))
+    problem = problem._replace(limits=Limits(**limits))
+    ends = frame.inward(np.array([[1.0, 20.0, 7.0]])), frame.inward(np.array([[1.0, 20.0, 12.0]]))
+    alone, bounded = (timed_lines(problem, *ends, max_acceleration=largest) for largest in (np.inf, 1e3))
+    assert alone.feasible.all() and alone.duration == pytest.approx(bounded.duration, rel=1e-6)
+    assert 0.0 < alone.least_duration <= alone.duration

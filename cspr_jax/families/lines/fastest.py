@@ -17,6 +17,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_parts
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import in_one_plane, spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -87,6 +88,9 @@ def _fastest(
 ) -> Fastest:
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     timings = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
+    # Formulas give no duration where neither taut cables nor `max_acceleration` bound the acceleration; limits may.
+    by_limits_alone = ~timings.is_bounded & (rule == "optimum" and _bound_accelerations(problem.limits))
+    timings.is_bounded[by_limits_alone], timings.lower_bound[by_limits_alone] = True, 0.0
     results, may_move, in_place = _at_rest(problem, starts, ends, timings)
     verdicts_of = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
@@ -94,11 +98,13 @@ def _fastest(
         # the peak of the acceleration may lie beyond its limit.
         is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
         is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
-        indices = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
+        indices = np.flatnonzero(
+            may_move & ~by_limits_alone & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within)
+        )
         if len(indices) > 0:
             results.replace(indices, verdicts_of(starts[indices], ends[indices], timings.part(indices)))
     # If an end breaks a limit, no other motion helps.
-    indices = np.flatnonzero(may_move & in_place & ((results.verdict != 0) | ~in_plane))
+    indices = np.flatnonzero(may_move & in_place & ((results.verdict != 0) | ~in_plane | by_limits_alone))
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(indices) > 0:
         before, positions = timings.part(indices), (starts[indices], ends[indices])
         searched = by_search(problem, *positions, before, law=law, max_acceleration=max_acceleration)
@@ -112,6 +118,12 @@ def _fastest(
         cells = by_cells(problem, starts[indices], ends[indices], max_acceleration)
         timings.lower_bound[indices] = np.maximum(timings.lower_bound[indices], cells)
     return Fastest(timings, results, moves)
+
+
+def _bound_accelerations(limits: Limits) -> bool:
+    # Tell whether limits bound the acceleration along every line.
+    largest = limits.tension_max
+    return limits.acceleration_max is not None or (largest is not None and bool(np.isfinite(np.asarray(largest)).all()))
 
 
 def _at_rest(
