@@ -1,4 +1,4 @@
-"""Rates of the checks, beside NumPy versions in the same run and, on request, hand-written C++ ones."""
+"""Rates of checks, beside NumPy versions in the same run and, on request, beside kernels written by hand in C++."""
 
 import os
 import platform
@@ -14,7 +14,7 @@ SCHEMA = 1
 
 
 def bench(kernels: Path | None = None) -> dict[str, Any]:
-    """Measure the rates."""
+    """Measure all rates."""
     by_hand = None if kernels is None else hand_written.compiled(kernels)
     six, three = six_cables.work(device_batch_size(six_cables.TRAJECTORIES)), three_cables.work()
     batches = six_cables.batches(six)
@@ -56,7 +56,7 @@ def _ratios(rates: dict[str, dict[str, float]], to: dict[str, float]) -> dict[st
 
 
 def lines(report: dict[str, Any]) -> list[str]:
-    """Lines that `cspr bench` prints for people."""
+    """Lines of a report that `cspr bench` prints for people."""
     text = [f"checks per second, best of {report['repeats']}, {report['cores']} cores, {report['device']}"]
     for name, key in (("six_cable", "checks_per_second"), ("three_cable", "three_cable")):
         text.append(name.replace("_", "-"))

@@ -1,4 +1,4 @@
-"""Ellipses of a point mass: verdicts and intervals of frequencies a second, beside NumPy's version of the formulas."""
+"""Ellipses of a point mass: verdicts and frequency intervals a second, beside the same formulas in NumPy."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class EllipseWork(NamedTuple):
     """Random ellipses below the spools of a robot.
 
     Fields:
-        hull: of the spools.
-        ellipse: arrays (n, 3) m.
+        hull: hull of the spools.
+        ellipse: vectors of the ellipses, arrays (n, 3) m.
         frequency: (n,) rad/s.
     """
 
@@ -33,7 +33,7 @@ class EllipseWork(NamedTuple):
 
 
 def work(count: int) -> EllipseWork:
-    """Draw ellipses."""
+    """Draw random ellipses."""
     rng, robot = np.random.default_rng(0), load_robot("prototype")
     centre = rng.normal(size=(count, 3)) * [0.08, 0.08, 0.2] + [0.0, 0.0, 2.0]
     axes = rng.normal(size=(2, count, 3)) * [0.3, 0.3, 0.1]
@@ -61,7 +61,7 @@ def numpy_intervals(case: EllipseWork) -> Float[np.ndarray, "2 n"]:
 
 
 def _numpy_terms(case: EllipseWork) -> tuple[np.ndarray, ...]:
-    # constant, tilting and pulling (..., n, n_edges), depth and swing (n,).
+    # Return constant, tilting and pulling (..., n, n_edges), depth and swing (n,).
     edges, normal = np.asarray(case.hull.edges), np.asarray(case.hull.normal)
     flat = [vector[:, :2] @ edges.T for vector in case.ellipse]
     depth, *swing = (vector @ normal for vector in case.ellipse)
@@ -71,7 +71,7 @@ def _numpy_terms(case: EllipseWork) -> tuple[np.ndarray, ...]:
 
 
 def rates() -> dict[str, dict[str, float]]:
-    """Ellipses a second, from arrays to arrays."""
+    """Ellipses a second, with conversions from and to NumPy arrays."""
     case = work(COUNT)
 
     def of_many(function, *items):

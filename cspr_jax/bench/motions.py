@@ -1,4 +1,4 @@
-"""Proofs of motions a second: long records of three cables, and many motions of eight cables together."""
+"""Proofs of motions a second: of long records for three cables, and of many motions for eight cables at a time."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -18,19 +18,19 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 
-DURATION, WAYPOINTS = 10.0, 7  # s; way-points of a motion
-ROWS, TOGETHER = 10_001, 100  # of a record; motions that are proved together
+DURATION, WAYPOINTS = 10.0, 7  # duration of a motion, s, and its number of waypoints
+ROWS, TOGETHER = 10_001, 100  # rows of a record, and number of motions proved at a time
 
 
 class Region(NamedTuple):
-    """Region in which the motions of a robot go, and what its cables may pull.
+    """Region of a robot's motions, and limits of its tensions.
 
     Fields:
         robot: name in the catalogue.
-        middle: of the way-points, from the centroid of the spools, z down, m.
-        radius: largest distance of each coordinate from the middle, m.
-        tilt: largest component of the quaternions' vectors; 0 for a point mass.
-        tensions: least and largest, N.
+        middle: middle of the waypoints, from the centroid of the spools, z down, m.
+        radius: largest deviation of each coordinate from the middle, m.
+        tilt: largest component of the vector parts of quaternions; 0 for a point mass.
+        tensions: lower and upper limit, N.
     """
 
     robot: str
@@ -59,18 +59,18 @@ def poses(region: Region, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
 
 
 def _motion(region: Region, rng: np.random.Generator) -> Spline:
-    # Quintic spline through random poses.
+    # Return a quintic spline through random poses.
     return interpolated(np.linspace(0.0, DURATION, WAYPOINTS), *poses(region, rng), interpolation="quintic")
 
 
 def _decided(proofs: list[MotionProof]) -> None:
-    # Only motions that are decided count.
+    # Refuse motions that are not decided, since their proofs stop early.
     if any(not proof.is_feasible and not proof.broken.any() for proof in proofs):
         raise SelfCheckError("a motion of the bench is neither proved nor refuted")
 
 
 def record_rate() -> float:
-    """Records of three cables that are interpolated and proved a second, each of `ROWS` rows."""
+    """Records of `ROWS` rows for three cables that are interpolated and proved a second."""
     case, spline = problem(THREE), _motion(THREE, np.random.default_rng(0))
     times = np.linspace(0.0, DURATION, ROWS)
     positions = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
@@ -78,7 +78,7 @@ def record_rate() -> float:
 
 
 def together_rate() -> float:
-    """Motions of eight cables that are proved a second, `TOGETHER` at once."""
+    """Motions for eight cables that are proved a second, `TOGETHER` at a time."""
     case, rng = problem(EIGHT), np.random.default_rng(0)
     splines = SplineBatch([_motion(EIGHT, rng) for _ in range(TOGETHER)])
     prove = partial(proofs_of, case, splines.bounds, splines.durations, jumps=splines.jumps)
@@ -86,7 +86,7 @@ def together_rate() -> float:
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of this work."""
+    """Rates of records and of motions."""
     return {f"3 cables, {ROWS} rows": record_rate(), f"8 cables, {TOGETHER} together": together_rate()}
 
 

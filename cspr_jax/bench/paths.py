@@ -1,4 +1,4 @@
-"""The fastest motions along random paths a second, together, from paths to path speeds on their grids."""
+"""Fastest motions along random paths a second, many at a time, from paths to path speeds on grids."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.discrete import discretes
 from cspr_jax.families.paths.least_time.jumping import jumping_motions
 
-# Paths that are solved together; cells of each.
+# Number of paths solved at a time, and number of cells of each.
 TOGETHER, CELLS = 64, 500
-# Splines go beyond their points: at rest the tensions are to be within their limits there too.
+# Splines overshoot their waypoints: a small radius keeps tensions at rest within the limits there too.
 REGIONS = {"3 cables": motions.THREE._replace(radius=0.06), "8 cables": motions.EIGHT}
 
 
 def _section(region: motions.Region, rng: np.random.Generator) -> Section:
-    # A cubic spline through random poses, over the length of their polygon.
+    # Return a cubic spline through random poses, parametrized by the length of their polygon.
     positions, turns = motions.poses(region, rng)
     knots = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
     curve = interpolated(knots, positions, turns, ends="natural")
@@ -25,7 +25,7 @@ def _section(region: motions.Region, rng: np.random.Generator) -> Section:
 
 
 def rate(region: motions.Region) -> float:
-    """Paths a second, `TOGETHER` at once."""
+    """Paths a second, `TOGETHER` at a time."""
     problem, rng = motions.problem(region), np.random.default_rng(0)
     sections = [_section(region, rng) for _ in range(TOGETHER)]
     settings = [SectionSettings(CELLS, 0.0)] * TOGETHER
@@ -38,7 +38,7 @@ def rate(region: motions.Region) -> float:
 
 
 def rates() -> dict[str, float]:
-    """Rates of all of this work."""
+    """Paths a second for all regions."""
     return {name: rate(region) for name, region in REGIONS.items()}
 
 

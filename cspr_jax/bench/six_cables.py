@@ -1,6 +1,6 @@
-"""Six-cable checks: the six tensions and the sign of the determinant at one tau of one transition from rest.
+"""Six-cable checks: the six tensions and the sign of the determinant at one tau of a transition from rest.
 
-The MSSM goes to one position with random orientations, numbers of arcs and beta-hat. The NumPy version computes the
+The MSSM moves to one position with random orientations, numbers of arcs and beta-hat. The NumPy version computes the
 printed formulas, (3.1) to (3.11), (3.44) and (3.80), on whole arrays, and solves with `np.linalg.solve`.
 """
 
@@ -39,11 +39,11 @@ class SixCableWork(NamedTuple):
     """Transitions from rest, all to `TARGET`.
 
     Fields:
-        robot: the MSSM.
-        axis: (n, 3) unit vectors of the rotation.
-        angle: (n,) rad.
-        arcs: (n,).
-        beta_hat: (n,) of the target.
+        robot: the MSSM with six cables.
+        axis: (n, 3) unit vectors of the axes of rotation.
+        angle: (n,) angles of rotation, rad.
+        arcs: (n,) numbers of arcs.
+        beta_hat: (n,) beta-hat of the target.
     """
 
     robot: PlatformRobot
@@ -54,7 +54,7 @@ class SixCableWork(NamedTuple):
 
 
 def work(count: int) -> SixCableWork:
-    """Random transitions."""
+    """Draw random transitions."""
     rng = np.random.default_rng(0)
     axis = rng.normal(size=(3, count))
     axis /= np.linalg.norm(axis, axis=0)
@@ -64,11 +64,11 @@ def work(count: int) -> SixCableWork:
 
 
 class Batch(NamedTuple):
-    """Segments of one number of arcs, as many as lanes.
+    """Segments with the same number of arcs, padded to a fixed number of lanes.
 
     Fields:
-        arcs: how many.
-        real: how many segments are not padding.
+        arcs: number of arcs.
+        real: number of segments that are not padding.
         segments: arrays (lanes, ...), on the device.
     """
 
@@ -78,7 +78,7 @@ class Batch(NamedTuple):
 
 
 def batches(work: SixCableWork) -> list[Batch]:
-    """The work by numbers of arcs."""
+    """Batches of the work, grouped by number of arcs."""
     half = work.angle[:, None] / 2.0
     quaternions = np.concatenate([np.cos(half), np.sin(half) * work.axis], axis=1)
     portions, lanes = [], device_batch_size(LANES)
@@ -138,8 +138,7 @@ def numpy_rate(work: SixCableWork) -> float:
 
 
 def _numpy_checks(task: SixCableWork) -> np.ndarray:
-    # Return the smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its
-    # sign.
+    # Return the smallest tension per mass and length of each trajectory, (n,); -inf where the determinant changes sign.
     tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * task.arcs[:, None]
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
     a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2

@@ -1,4 +1,4 @@
-"""Three-cable checks: the three pseudotensions at one tau of one trajectory.
+"""Three-cable checks: the three pseudotensions at one tau of a trajectory.
 
 The NumPy version computes the printed formulas, (2.12) to (2.14) and (2.31) to (2.48), on whole arrays.
 """
@@ -29,11 +29,11 @@ START = (0.7, 0.7, 3.0)
 
 
 class ThreeCableWork(NamedTuple):
-    """Measured work.
+    """Segments to check.
 
     Fields:
         problem: robot and amplitude function.
-        ends: (n, 3) m.
+        ends: (n, 3) end points, m.
         segments: for even numbers of arcs and for odd ones, arrays (n, ...).
     """
 
@@ -43,7 +43,7 @@ class ThreeCableWork(NamedTuple):
 
 
 def work() -> ThreeCableWork:
-    """Segments from one point to random ones."""
+    """Draw segments from one point to random ones."""
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
@@ -56,7 +56,7 @@ def work() -> ThreeCableWork:
 
 
 def rate(work: ThreeCableWork, dtype: str) -> float:
-    """Checks a second of the screen."""
+    """Checks a second by the screen."""
     pair = jax.tree.map(lambda x: np.asarray(x, dtype), work.segments)
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
@@ -67,7 +67,7 @@ def rate(work: ThreeCableWork, dtype: str) -> float:
 
 
 def checks(count: int) -> int:
-    """Number of checks of segments."""
+    """Number of checks that segments take."""
     return count * MAX_ARCS * screen.SAMPLES
 
 

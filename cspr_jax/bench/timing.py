@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 REPEATS = 5
-# Sides of the matrices that are multiplied, and bytes that are copied: far beyond every cache.
+# Number of rows of the multiplied matrices, and bytes of the copied array: far more than caches hold.
 SIDE, COPIED = 3072, 2**28
 
 
 def best(work: Callable[[], object], repeats: int | None = None) -> float:
-    """The shortest of several times, after one that compiles."""
+    """The shortest of several durations, after a first run that compiles."""
     work()
     times = []
     for _ in range(repeats or REPEATS):
@@ -49,6 +49,6 @@ def _square(pool: ThreadPoolExecutor, matrix: np.ndarray, product: np.ndarray) -
 
 
 def operations(lowered: Any, cases: int) -> float | None:
-    """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once."""
+    """Arithmetic operations a case of a compiled function, as XLA counts them; it counts the body of a loop once."""
     costs = lowered.compile().cost_analysis() or {}
     return costs["flops"] / cases if "flops" in costs else None

@@ -1,4 +1,4 @@
-"""Workspaces: margins of poses a second, clearances of cables, least tensions; beside linear programs and squares."""
+"""Workspaces: margins of poses, clearances of cables, tensions of least norm a second; beside LP and least squares."""
 
 import time
 from functools import partial
@@ -24,18 +24,18 @@ from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.requirements import CLOSURE, FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Batches of poses, and of poses with twelve cables.
+# Number of batches of poses, and of poses with twelve cables.
 BATCHES, FEW_BATCHES = 16, 4
-# Poses of one call: for distances of cables, for tensions, and for linear programs and least squares.
+# Numbers of poses in one call: for distances of cables, for tensions, and for linear programs and least squares.
 PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
 class SamplePoses(NamedTuple):
-    """Random poses among the spools, as lanes.
+    """Random poses below the spools, as lanes.
 
     Fields:
-        position: three arrays (n,), of the mass centre, m.
-        quaternion: four arrays (n,), unit quaternions; None of a point mass.
+        position: three arrays (n,), position of the mass centre, m.
+        quaternion: four arrays (n,), unit quaternions; None for a point mass.
     """
 
     position: tuple[np.ndarray, ...]
@@ -62,7 +62,7 @@ def _four_cables() -> PointMassRobot:
 
 
 def _twelve_cables() -> PlatformRobot:
-    # The eight of a box, and four more at the middles of its edges.
+    # Add four cables at the middles of edges to the eight of a box.
     signs = (-1.0, 1.0)
     corners = np.array(
         [[x, y, z] for x in signs for y in signs for z in signs] + [[x, y, 0.0] for x in signs for y in signs]
@@ -75,7 +75,7 @@ def _twelve_cables() -> PlatformRobot:
 def margin_rate(
     robot: PointMassRobot | PlatformRobot, condition: str, dtype: str, *, by_null_space: bool, batches: int
 ) -> tuple[float, float]:
-    """Margins of one condition a second, from poses as lanes to their two bounds."""
+    """Margins of one condition a second, from poses as lanes to lower and upper bounds."""
     centred_robot = centred(robot)[0]
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, condition, robot.limits))
@@ -93,7 +93,7 @@ def margin_rate(
 
 
 def clearance_rate(dtype: str) -> float:
-    """Poses a second of which the nearest two of eight cables are found, among 28 pairs."""
+    """Poses a second for which the nearest two of eight cables are found, among 28 pairs."""
     signs = (-1.0, 1.0)
     corners = np.array([[x, y, z] for x in signs for y in signs for z in signs])
     robot = platform_robot(corners * [5.0, 4.0, 3.0], corners * [0.4, 0.3, 0.2], mass=1.0, inertia=np.eye(3))
@@ -112,7 +112,7 @@ def clearance_rate(dtype: str) -> float:
 
 
 def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
-    """Least tensions within limits a second, from arrays of wrench matrices to arrays of tensions."""
+    """Tensions of least norm within limits a second, from arrays of wrench matrices to arrays of tensions."""
     count = TENSIONS
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
@@ -127,7 +127,7 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of this work."""
+    """Rates of margins, clearances and tensions."""
     eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
     rows: dict[str, Any] = {}
     for name, robot, condition, by_null_space, batches in (
@@ -148,7 +148,7 @@ def rates() -> dict[str, Any]:
 
 
 def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
-    # Return poses a second of linear programs and of least squares.
+    # Return poses a second by linear programs and by least squares.
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, SAMPLE, "float64")

@@ -23,19 +23,19 @@ EPILOGUE = (
     "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run the command again to resume"
 )
 
-# Environment variable of a command that has started itself again in a new process.
+# Environment variable that marks a command which has restarted itself in a new process.
 ANEW = "CSPR_BEGUN_ANEW"
-# Set only in a process that is ours: Python's passes over the many objects of jax take a tenth of a command's time.
+# Fewer garbage collections, only in a process of our own: passes over the objects of jax take a tenth of its time.
 FEWER_COLLECTIONS = (200_000, 20, 50)
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Print one line for a mistake, instead of the usage."""
+        """Print one line about the mistake instead of the usage."""
         self.exit(ExitCode.BAD_INPUT, f"{printable(f'{self.prog}: {message} (see {self.prog} --help)')}\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        # Help and versions come through here; the usual method says nothing where it cannot print.
+        # Help and version are printed by `write`, which reports an output that cannot be written; argparse does not.
         if file is sys.stdout:
             write(message)
         else:
@@ -82,7 +82,7 @@ def _answered(options: argparse.Namespace, prompt: Prompt, environment: dict[str
         prompt.tell()
         return int(prompt.code)
     except BrokenPipeError:
-        _close_output()  # its reader has gone; there is nobody left to tell
+        _close_output()  # nobody reads the output any more
         return int(ExitCode.DONE)
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
@@ -108,14 +108,14 @@ def _unexpected(error: Exception, environment: dict[str, str] | None) -> int:
 
 
 def _begin_anew(environment: dict[str, str]) -> NoReturn:
-    # In a process that is new: jax holds in memory what it has loaded.
+    # Start a new process: jax keeps in memory what it has loaded.
     compile_cache.hand_over()
     sys.stderr.flush()
     os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], environment | {ANEW: "1"})
 
 
 def _mend_streams() -> None:
-    # A closed stream would be an error at the end of the work, and its number the next file's.
+    # A closed stream would fail at the end of the work, and the next opened file would take over its number.
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             with contextlib.suppress(OSError):
@@ -126,7 +126,7 @@ def _mend_streams() -> None:
 
 
 def _flushed(code: int) -> int:
-    # Python would write what is left at its end, where it is too late for a line and an exit code of ours.
+    # Flush now: at exit, Python would fail too late for a message and an exit code of ours.
     try:
         with printing():
             sys.stdout.flush()
@@ -137,13 +137,13 @@ def _flushed(code: int) -> int:
         if code in (ExitCode.DONE, ExitCode.NOT_FEASIBLE):
             warn(error)
             return int(error.exit_code)
-    except ValueError:  # it was closed before
+    except ValueError:  # the stream is already closed
         return int(code)
     return int(code)
 
 
 def _close_output() -> None:
-    # Python would otherwise try once more to write what is left in the buffer.
+    # Close it: otherwise Python tries again at exit to write what is left in the buffer.
     with contextlib.suppress(OSError):
         sys.stdout.close()
 
@@ -172,7 +172,7 @@ def _complete_files(parser: argparse.ArgumentParser, files: dict[str, Any]) -> N
             action.complete = files  # type: ignore[attr-defined]
 
 
-# Commands come in the order of the help. A new command is a row of one of these modules.
+# Commands in the order of the help; a new command is a row of one of these modules.
 COMMANDS = (
     *(*sweeps.COMMANDS, *plans.COMMANDS, *checks.COMMANDS, *pictures.COMMANDS, *published.COMMANDS, *listings.COMMANDS),
     Command("completion", "print a script with which a shell completes commands", _add_completion, _completion),

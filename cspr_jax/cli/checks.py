@@ -1,4 +1,4 @@
-"""Command about a motion of the user's own: check."""
+"""The command check, for motions of the user's own."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A command as a row, and what commands share: JSON, tables, warnings, options, the start of jax."""
+"""A command as a row of a table, and what commands share: JSON, tables, warnings, options, the start of jax."""
 
 import argparse
 import contextlib
@@ -29,31 +29,31 @@ class Command(NamedTuple):
 
 
 def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
-    """Add the option for programs that read the answer."""
+    """Add the option to print JSON for programs."""
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
 
 
 def add_device(parser: argparse.ArgumentParser, usual: str = "cpu") -> None:
-    """Add the option of the device."""
+    """Add the option that chooses the device."""
     parser.add_argument("--device", choices=("cpu", "gpu"), help=f"where to compute (default: {usual})")
 
 
 def add_all_errors(parser: argparse.ArgumentParser) -> None:
-    """Add the option to print all mistakes of a file."""
+    """Add the option to report all mistakes of a file, not only the first."""
     parser.add_argument("--all-errors", action="store_true", help="print all mistakes in a file, one per line")
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
-    """Add the option of the file or folder to write."""
+    """Add the option that names the file or folder to write."""
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
 
 
 def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu: bool = True) -> None:
-    """Set up jax by the options; from here on a line says when it compiles."""
+    """Set up jax by the options; from now on, compilations are announced."""
     from cspr_jax.runtime import process_environment, xla
 
     process_environment.check_threads(processes=0)
-    if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
+    if getattr(options, "scheduler", None) is None:  # workers of a scheduler have settings of their own
         xla.prepare(options.device, warn, quick=quick, prefers_cpu=prefers_cpu)
     process_environment.defer_fortran()
     xla.check_device(options.device)
@@ -62,7 +62,7 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Name standard output in the error if it cannot be written."""
+    """Raise an error that names standard output if it cannot be written."""
     try:
         yield
     except BrokenPipeError:
@@ -99,6 +99,6 @@ def print_path(path: Path | str) -> None:
 
 
 def warn(line: object) -> None:
-    """Write a warning to standard error; drop it if that fails."""
+    """Write a warning to standard error; ignore a failure to write it."""
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(f"cspr: {printable(line)}\n")

@@ -1,4 +1,4 @@
-"""Commands about files to start from, and what there is: new, import, robots, quantities, examples."""
+"""Commands that start files and list what there is: new, import, robots, quantities, examples."""
 
 import argparse
 from pathlib import Path
@@ -47,7 +47,7 @@ def _add_robots(parser: argparse.ArgumentParser) -> None:
 def _robots(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.listings import catalogue_table, robot_details
 
-    if not options.names and not options.json:  # what takes long to import is not needed
+    if not options.names and not options.json:  # answer without slow imports
         print_table(catalogue_table())
         return ExitCode.DONE
     from cspr_jax.api.files.listings import list_robots

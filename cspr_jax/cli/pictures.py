@@ -1,4 +1,4 @@
-"""Commands about pictures and pages of results: plot, report."""
+"""Commands for pictures and pages of results: plot, report."""
 
 import argparse
 from pathlib import Path
@@ -15,7 +15,7 @@ def _plot(options: argparse.Namespace) -> int:
 
     at = selection.coordinates_of(options.at)
     results = [selection.result_at(path) for path in options.result]
-    if options.quantity == ACCELERATION or options.robot is not None:  # the pictures that are computed
+    if options.quantity == ACCELERATION or options.robot is not None:  # only these pictures compute something
         prepare_jax(options, quick=options.quantity != ACCELERATION)
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:

@@ -1,4 +1,4 @@
-"""Commands about sequences of poses: plan, and replay, which plays one in MuJoCo."""
+"""Commands for sequences of poses: plan, and replay, which plays a plan in MuJoCo."""
 
 import argparse
 import math
@@ -23,7 +23,7 @@ from cspr_jax.runtime.progress import waiting
 from cspr_jax.store.files.publishing import check_writable
 
 ENDINGS = (".csv", ".h5", ".json")
-SAME_TICK = 1e-6  # of a step, by which the end of a motion may miss the grid of its rows
+SAME_TICK = 1e-6  # fraction of a step by which the last row may be off the grid of the others
 _STEP = "longest step of MuJoCo, s (default 0.0005)"
 
 
@@ -37,7 +37,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
 
 
 def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
-    """Add the options of motions that are run along again."""
+    """Add the options of retiming."""
     parser.add_argument("--retime", action="store_true", help=does)
     parser.add_argument(
         "--ramp-time",
@@ -54,7 +54,7 @@ def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
 
 
 def retime_settings(options: argparse.Namespace) -> dict[str, Any]:
-    """Settings of a motion that is run along again."""
+    """Settings of retiming, from the options."""
     from cspr_jax.schema.limits import LARGEST_GRID
 
     settings = {name: getattr(options, name) for name in ("ramp_time", "grid")}
@@ -69,7 +69,7 @@ def retime_settings(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> None:
-    """Add the options of files of a motion: rows, a model for MuJoCo, a film."""
+    """Add the options for files of a motion: rows, a model for MuJoCo, a film."""
     add_output(parser, "write the motion to FILE.csv, FILE.h5 or FILE.json", metavar="FILE")
     parser.add_argument("--anyway", action="store_true", help=anyway)
     parser.add_argument(
@@ -92,7 +92,7 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
 
 
 def check_files(options: argparse.Namespace) -> None:
-    """Refuse impossible options of files, before what takes long."""
+    """Refuse impossible options for files before slow work starts."""
     if options.output is not None and options.output.suffix not in ENDINGS:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5 or .json")
     if options.rate is not None and options.output is None and not options.json:
@@ -144,7 +144,7 @@ def _plan(options: argparse.Namespace) -> int:
     plan = _planned(options)
     if options.retime:
         plan = retimed(plan, settings)
-    # Files come first, since they took long: printing a table may fail.
+    # Write files first: they took long, and printing a table may fail.
     try:
         write_files(plan, options)
     finally:
@@ -157,7 +157,7 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def retimed(plan: Any, settings: dict[str, Any]) -> Any:
-    """A plan, or a check, of motions that are run along again; its warnings are shown."""
+    """Retime a plan or a check; warnings are shown."""
     from cspr_jax.api.retiming import retime
 
     before = getattr(plan, "plan", plan).warnings
@@ -170,7 +170,7 @@ def retimed(plan: Any, settings: dict[str, Any]) -> Any:
 
 
 def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
-    """The rows that --rate asks for without -o; of a motion that is not feasible only with --anyway."""
+    """The rows that --rate asks for without -o; if the motion is not feasible, only with --anyway."""
     if options.rate is None:
         return {}
     step = last_step(plan, options.rate)
@@ -184,7 +184,7 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def write_files(plan: Any, options: argparse.Namespace) -> None:
-    """Write the files that options name; a motion that is not feasible only with --anyway."""
+    """Write the files that options name; if the motion is not feasible, only with --anyway."""
     of_mjcf = {} if options.step is None else {"step": options.step}
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
@@ -203,7 +203,7 @@ def write_files(plan: Any, options: argparse.Namespace) -> None:
 
 
 def last_step(plan: Any, rate: float | None) -> float:
-    """Time between the last two rows: the end of a motion is a row, on the grid of the others or not."""
+    """Time between the last two rows; the last row is the end of the motion, on the grid of the others or off it."""
     length = float(plan.answers.duration.sum())
     if rate is None or not math.isfinite(length):
         return math.nan
@@ -212,7 +212,7 @@ def last_step(plan: Any, rate: float | None) -> float:
 
 
 def print_last_step(plan: Any, options: argparse.Namespace) -> None:
-    """Say so where the last row of a written file is off the grid of the others."""
+    """Warn if the last row of a written file is off the grid of the others."""
     step, is_written = last_step(plan, options.rate), plan.feasible or options.anyway
     if options.output is not None and is_written and step * (options.rate or 0.0) < 1.0 - SAME_TICK:
         end = float(plan.answers.duration.sum())
@@ -241,7 +241,7 @@ def _replay(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots.style.style import style_of
 
     style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**style)  # before what takes long
+    style_of(**style)  # refuse bad options before slow work
     need_mujoco()
     plan = _planned(options)
     if not (plan.feasible or options.anyway):

@@ -1,4 +1,4 @@
-"""Commands about published figures and speed: table, bench."""
+"""Commands for published tables and for speed: table, bench."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands about sweeps and their runs: run, merge, status, verify, volume."""
+"""Commands for sweeps and their runs: run, merge, status, verify, volume."""
 
 import argparse
 import datetime
@@ -136,7 +136,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _details(state: dict[str, Any]) -> list[str]:
-    # Return the lines that only some runs have to say.
+    # Return lines that apply only to some runs.
     lines = list[str]()
     if state["cells_per_second"] is not None and state["result"] is None:
         left = datetime.timedelta(seconds=round(state["seconds_left"]))
@@ -161,7 +161,7 @@ def _verify(options: argparse.Namespace) -> int:
         print_json(report)
     else:
         counts = ", ".join(f"{key} {report[key]}" for key in VERIFIED if key in report)
-        if counts:  # a file that cannot be read has none
+        if counts:  # a file that cannot be read has no counts
             print_line(f"{report['path']}: {counts}")
     again = "run the sweep" if "shards" in report else "run or plan it"
     for error in report["faults"]:

@@ -1,1 +1,1 @@
-"""Trajectory families: a folder each, with all that is known about it. None imports another."""
+"""Trajectory families: one folder each, with all of its formulas, proofs and maps. No family imports another."""

@@ -12,7 +12,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.numerics.shapes import Float
 
-# Distance of a point of release from the parabola, over its distance from the target, up to which it lies on it.
+# A release lies on a parabola if its distance from it is at most this fraction of its distance from the target.
 ON_PARABOLA = 1e-6
 DOWN = np.array([0.0, 0.0, 1.0])
 
@@ -24,7 +24,7 @@ def flown(position: Any, velocity: Any, gravity: Any, time: Any) -> tuple[Any, A
 
 
 def aimed(position: Any, target: Any, gravity: Any, time: Any) -> Any:
-    """Velocity at the release with which a target is reached after a time, launch paper (26a)."""
+    """Velocity of a release from which free flight reaches a target after a time, launch paper (26a)."""
     down = DOWN * gravity
     return (target - position) / time - 0.5 * down * time
 
@@ -32,9 +32,9 @@ def aimed(position: Any, target: Any, gravity: Any, time: Any) -> Any:
 def nearest_time(
     position: Float[np.ndarray, "3"], target: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], gravity: float
 ) -> tuple[float, float] | None:
-    """Time of flight at which the parabola that reaches a target with a velocity comes nearest to a release."""
+    """Time and distance at which the parabola through a target, with a velocity there, is nearest to a release."""
     down, ray = 0.5 * gravity * np.array([0.0, 0.0, 1.0]), target - position
-    # |ray - velocity t + down t^2|^2, by powers of t, the highest first.
+    # Coefficients of |ray - velocity t + down t^2|^2 in powers of t, the highest first.
     square = [
         down @ down,
         -2.0 * down @ velocity,
@@ -50,13 +50,13 @@ def nearest_time(
 
 
 class Parabola(NamedTuple):
-    """Flight to a target, from a point of release or with a velocity at the target.
+    """Flight to a target, given by the point of release or by the velocity at the target.
 
     Fields:
         target: (3,) from the centroid of the spools, z down, m.
-        point: (3,) point of the release, m; None: `velocity` determines it.
+        point: (3,) of release, m; None: `velocity` determines it.
         velocity: (3,) at the target, m/s; None: `point` and the time of flight determine it.
-        time: of the flight, s; None: to be chosen.
+        time: time of flight, s; None: to be chosen.
     """
 
     target: np.ndarray
@@ -66,7 +66,7 @@ class Parabola(NamedTuple):
 
 
 def parabola_of(table: LaunchTable, frame: Frame, gravity: float, path: Path) -> Parabola:
-    """Flight that a table asks for."""
+    """Flight that a [launch] table asks for."""
     target = np.asarray(frame.inward(table.target))
     point = None if table.point is None else np.asarray(frame.inward(table.point))
     velocity = None if table.velocity is None else np.asarray(frame.rotated(np.asarray(table.velocity)))

@@ -1,9 +1,9 @@
-"""Scatter of landings: errors of the winches and of the time of release, by a random sample and to first order.
+"""Scatter of landings due to errors of the winches and of the time of release, by random sampling and to first order.
 
-At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
-as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of the residuals
-is smallest. From there the object flies to the height of its target. A random sample of errors gives a sample of
-landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
+At the release, lengths and rates of the cables differ from the plan's. The effector is at the position and has the
+velocity that these lengths and rates determine; redundant cables, whose errors contradict each other, determine them
+by least squares. From there the object flies to the height of its target. A random sample of errors gives a sample of
+landings; the derivatives of the landing with respect to all errors give the covariance for small errors.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cspr_jax.robots.statics.force_balance import cable_motion
 
 BATCH = 1024
 NEWTON_STEPS = 12
-# As in the keys of a plan file.
+# As for the keys of a plan file.
 LARGEST_ERROR = 1e3
 MAX_THROWS = 1_000_000
 LARGEST_SEED = 2**63 - 1
@@ -40,9 +40,9 @@ class Throw(NamedTuple):
     """Planned release.
 
     Fields:
-        motions: consecutive motions, z down; of one of them the object is released, at its end or before.
-        release: () time after the start of the first one, s.
-        target: (3,) m; landings are looked for at its height.
+        motions: consecutive motions, z down; the object is released at the end of one or before.
+        release: () time of release since the start of the first motion, s.
+        target: (3,) m; the object lands at its height.
     """
 
     motions: tuple[Motion, ...]
@@ -59,7 +59,7 @@ class LaunchErrors:
         release: standard deviation of the time of release, s.
         cable_length: standard deviation of the length of each cable at the release, m.
         cable_speed: standard deviation of the rate of each cable's length, m/s.
-        encoder: largest error of each length due to the resolution of its encoder, m; uniformly distributed.
+        encoder: largest error of each length due to the resolution of its encoder, m; errors are uniformly distributed.
         throws: number of throws in the sample.
         seed: seed of the random sample.
     """
@@ -81,12 +81,12 @@ class LaunchErrors:
 
 @dataclasses.dataclass(frozen=True)
 class Scatter:
-    """Landings of a sample of throws, and their covariance to first order.
+    """Landings of a sample of throws, their covariance, and the covariance to first order.
 
     Fields:
-        landings: (throws, 2) x and y over those of the target, m; NaN where the object never comes to its height.
-        covariance: (2, 2) of the sample, m^2.
-        first_order: (2, 2) of small errors, by derivatives, m^2.
+        landings: (throws, 2) x and y relative to the target, m; NaN where the object never comes to its height.
+        covariance: (2, 2) covariance of the sample, m^2.
+        first_order: (2, 2) covariance for small errors, by derivatives, m^2.
     """
 
     landings: np.ndarray
@@ -110,8 +110,8 @@ class Scatter:
 
 
 def state_at(throw: Throw, late: Float[Array, ""]) -> State:
-    """State of the effector some time after the planned release; before and after all motions it rests at an end."""
-    # Between two motions nothing is clipped: a clip would halve the derivative of a release there.
+    """State of the effector some time after the planned release, at rest before the first and after the last motion."""
+    # Times of single motions are not clipped between them: clipping halves the derivative of a release at a waypoint.
     time = jnp.maximum(throw.release + late, 0.0)
     *others, last = throw.motions
     states, starts = [], []
@@ -138,7 +138,7 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Float[Array, 
 
 
 def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
-    # Find by Newton's method the position where the cables have these lengths; its last step carries the derivatives.
+    # Find the position with these cable lengths by Newton's method; its last step carries the derivatives.
     def step(position, _):
         current_lengths = cable_motion(robot, position, position * 0.0, position * 0.0)[0]
         return position + _moving(robot, position, lengths - current_lengths), None
@@ -147,7 +147,7 @@ def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
 
 
 def _moving(robot: PointMassRobot, position: Array, rates: Array) -> Array:
-    # Return the velocity at which the lengths have these rates; on redundant cables the one that comes nearest.
+    # Return the velocity that gives these rates; on redundant cables, by least squares.
     units = jax.jacfwd(lambda velocity: cable_motion(robot, position, velocity, velocity * 0.0)[1])(position * 0.0)
     units = units[:, np.array([0, 2])] if is_planar(robot) else units
     if robot.n_cables > robot.dof:
@@ -172,7 +172,7 @@ def _derivatives(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
     """Scatter of the landings of a launch."""
     count, random = robot.n_cables, np.random.default_rng(errors.seed)
-    # Standard errors are drawn and then scaled, always all of them: larger errors of one kind scale the same sample.
+    # All kinds of errors are always drawn, then scaled: so larger errors of one kind scale the same sample.
     release = random.normal(size=(errors.throws, 1)) * errors.release
     lengths = random.normal(size=(errors.throws, count)) * errors.cable_length
     rates = random.normal(size=(errors.throws, count)) * errors.cable_speed

@@ -25,20 +25,20 @@ class LaunchResult(LegResult):
     """Release of an object and its flight, in the axes of the robot file.
 
     Fields:
-        segment: number of the segment on which, or at whose end, the object is released, from 0 on.
+        segment: index of the segment on which, or at whose end, the object is released, from 0.
         position: (3,) at the release, m.
-        velocity: (3,) likewise, m/s.
-        time: of the release, since the start of the plan, s.
-        control_points: (3, 3) of a Bezier segment, m; None of others.
+        velocity: (3,) at the release, m/s.
+        time: time of the release since the start of the plan, s.
+        control_points: (3, 3) control points of a Bezier segment, m; None for other motions.
         landing: (3,) where the flight ends, m.
-        flight_time: s.
+        flight_time: time of flight, s.
         tension_min: smallest tension on the segment, N.
-        throw: the release and its motions, for errors.
-        robot: centred, z down.
-        frame: of the robot file.
-        scatter: of the landings, of a plan that names errors.
-        half_axes: (2, 3) of the last ellipse, from its centre to the release, and to the point a quarter of a turn
-            later, m; None of other motions.
+        throw: the release and its motions, from which errors start.
+        robot: centred robot, z down.
+        frame: frame of the robot file.
+        scatter: scatter of the landings, if the plan names errors.
+        half_axes: (2, 3) vectors of the last ellipse, from its centre to the release and to the point a quarter of a
+            turn later, m; None for other motions.
     """
 
     segment: int
@@ -58,7 +58,7 @@ class LaunchResult(LegResult):
     key: ClassVar[str] = "launch"
 
     def to_dict(self) -> dict[str, Any]:
-        """The launch as a plan's JSON has it; see `LegResult.to_dict`."""
+        """The launch as the JSON of a plan has it; see `LegResult.to_dict`."""
         table = {
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
@@ -71,7 +71,7 @@ class LaunchResult(LegResult):
         return table if self.scatter is None else table | {"scatter": self.scatter.to_dict()}
 
     def lines(self) -> list[str]:
-        """A line of the release and the flight, and one of throws with errors; see `LegResult.lines`."""
+        """One line about the release and the flight, and one about throws with errors; see `LegResult.lines`."""
         if not math.isfinite(self.time + self.flight_time):
             return ["no launch"]
         release, landing = (
@@ -87,7 +87,7 @@ class LaunchResult(LegResult):
         return lines
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Flight of the object and landings of a sample of throws, none without a launch; see `LegResult.columns`."""
+        """Flight of the object and landings of a sample of throws; see `LegResult.columns`."""
         if not math.isfinite(self.flight_time):
             return {}
         t = np.linspace(0.0, self.flight_time, FLIGHT_ROWS)
@@ -100,9 +100,9 @@ class LaunchResult(LegResult):
         return columns
 
     def scatter_of(self, errors: LaunchErrors) -> Scatter:
-        """Scatter of the landings."""
+        """Scatter of the landings for given errors."""
         kernel_scatter = scatter(self.robot, self.throw, errors)
-        # Axes of the file are those of the kernels, or rotated about x.
+        # The axes of the file are those of the kernels, or those rotated about x.
         signs = np.asarray(self.frame.rotated(np.ones(3)))[:2]
         both = np.outer(signs, signs)
         landings, covariance, first_order = dataclasses.astuple(kernel_scatter)

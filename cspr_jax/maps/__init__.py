@@ -1,1 +1,1 @@
-"""Base classes of the maps of a sweep; the kinds of map are in the folders of their subjects."""
+"""Base classes of the maps of a sweep; each kind of map is in the folder of its subject."""

@@ -7,7 +7,7 @@ from cspr_jax.maps.grid_map import PointMassMap
 
 
 def check_start(robot_file: RobotFile, spec: SweepFile, file: object, *, rests: bool = False) -> None:
-    """Refuse a start that is no position of a robot."""
+    """Refuse a start that the robot cannot have."""
     start = spec.trajectory.start
     if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
         raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")

@@ -22,7 +22,7 @@ from cspr_jax.robots.model.point_mass import AT_P0, plane_normal, rest_point, sp
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
 
-# How far a refined margin may lie below the bound proved for it.
+# A refined margin may lie below its proved bound by this much, due to rounding.
 CHECK_ERROR = 1e-8
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
@@ -31,12 +31,12 @@ class GridMap(abc.ABC):
     """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
     Args:
-        file: named in errors.
-        for_bounds: whether the amplitude function may be "ideal", which is no motion.
+        file: path of the sweep file, named in errors.
+        for_bounds: whether the amplitude function may be "ideal", which only bounds have, no motion.
 
     Fields:
         any_cables: whether the robot may have more cables than degrees of freedom.
-        proves: whether verdicts of its motions are proved, unless they say that they are not.
+        proves: whether its verdicts are proved, except those that say that they are not.
 
     Raises:
         ConfigError: the robot, the amplitude function or the limits cannot be used.
@@ -46,7 +46,7 @@ class GridMap(abc.ABC):
     proves: ClassVar[bool] = False
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object, *, for_bounds: bool = False) -> None:
-        """Build what all tiles share."""
+        """Build what all tiles use."""
         self._keys, self._file = spec, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         self._problem = build_problem(
@@ -60,10 +60,10 @@ class GridMap(abc.ABC):
         )
 
     def _scene_or_none(self, robot_file: RobotFile) -> Any:
-        # Return the scene of the sweep; None: it has neither obstacles nor a shape of the platform.
+        # Return the scene of the sweep; None without obstacles and without a shape of the platform.
         if not self._keys.obstacle_keys:
             return None
-        from cspr_jax.build.scenes import scene_of  # with the geometry of bodies, which other sweeps need not
+        from cspr_jax.build.scenes import scene_of  # loads the geometry of bodies, which other sweeps do without
 
         spec, frame = self._keys, self._frame
         return scene_of(self._problem.robot, robot_file, frame, spec, self._file, trajectory=spec.trajectory)
@@ -74,14 +74,14 @@ class GridMap(abc.ABC):
 
     @abc.abstractmethod
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them."""
+        """Cells whose numbers contradict each other, which only a broken processor, driver or compiler can cause."""
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
-        """Number of cells without a proved answer: a feasible motion, the smallest number of arcs, or none at all."""
+        """Number of cells without a proof of either feasibility or infeasibility; None for maps that prove nothing."""
         return int(((answers["verdict"] & NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid in which no cell can have an answer, as where all targets are out of reach."""
+        """Refuse a grid in which no cell can have an answer, for example with all targets out of reach."""
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
     def _refuse_out_of_plane(self, grid: Grid) -> None:
@@ -93,7 +93,7 @@ class GridMap(abc.ABC):
             raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
+        # Return targets in the kernels' axes. Radius and azimuth are about the vertical through the spools' centroid.
         if "radius" not in cells:
             return self._frame.inward(np.stack([cells["x"], cells["y"], cells["z"]], axis=1))
         radius, azimuth = cells["radius"], cells["azimuth"]
@@ -101,15 +101,15 @@ class GridMap(abc.ABC):
         return np.c_[self._frame.rotated(level)[:, :2], self._frame.depth(cells["z"])]
 
     def _start_positions(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' coordinates, of axes and of `trajectory.from`.
+        # Return starts in the kernels' axes, from the axes of the grid and from `trajectory.from`.
         start, count = self._keys.trajectory.start, len(next(iter(cells.values())))
         fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
         columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
         return self._frame.inward(np.stack(columns, axis=1))
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        # Return cells among which depths and heights have their extremes. Of all azimuths take the one in which the
-        # spool plane descends most: no other target is deeper below it.
+        # Return cells that contain the extremes of depth and height. One azimuth is enough: that in which the spool
+        # plane descends most, since no other target is deeper below the plane.
         derivative = self._frame.rotated(plane_normal(self._problem.robot))
         axes = {
             name: np.array([points.min(), points.max()])
@@ -123,15 +123,15 @@ class GridMap(abc.ABC):
 
     @property
     def _missed(self) -> float:
-        # By how much slacks of limits may be below zero where limits are touched: of tensions over weight / n_cables,
-        # of depths over z0, at least a tenth of the robot's size.
+        # Return how far below zero the slack of a touched limit may be. Slacks of tensions are relative to
+        # weight / n_cables, slacks of depths to z0, which is at least a tenth of the robot's radius.
         limits, weight = self._problem.limits, self._weight
         tensions = np.ravel([x for x in (limits.tension_min, limits.tension_max) if x is not None])
         return 10.0 * TOUCHED * max(1.0, float(np.max(tensions[np.isfinite(tensions)], initial=0.0)) / weight)
 
     @property
     def _weight(self) -> float:
-        # The weight that a cable carries if all carry the same, N.
+        # Return the weight that each of equally loaded cables carries, N.
         robot = self._problem.robot
         return float(robot.mass * robot.gravity) / robot.n_cables
 
@@ -149,7 +149,7 @@ class GridMap(abc.ABC):
 
 
 class PlatformMap(GridMap):
-    """The map of a sweep of a platform; see `GridMap`."""
+    """A map of a platform; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse a point mass."""
@@ -159,7 +159,7 @@ class PlatformMap(GridMap):
 
     @property
     def _is_redundant(self) -> bool:
-        # On more than six cables there is no determinant.
+        # With more than six cables there is no determinant.
         return self._problem.robot.n_cables > self._problem.robot.dof
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -178,7 +178,7 @@ class PlatformMap(GridMap):
 
 
 class PointMassMap(GridMap):
-    """The map of a sweep of a point mass; see `GridMap`."""
+    """A map of a point mass; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Refuse a platform."""
@@ -190,7 +190,7 @@ class PointMassMap(GridMap):
         super().__init__(robot_file, spec, file, for_bounds=for_bounds)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' coordinates.
+        # Return the start in the kernels' axes.
         start = self._keys.trajectory.start
         return rest_point(np.asarray(cells["z0"])) if start is not None and start.rest else self._start_positions(cells)
 
@@ -210,6 +210,6 @@ class PointMassMap(GridMap):
 
 
 def exceeds(bound: Float[np.ndarray, "n"], margin: Float[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
-    """Tell where a bound exceeds its margin by more than rounding; cables that span too little have the margin -inf."""
+    """Tell where a bound exceeds its margin by more than rounding; the margin is -inf if the cables cannot balance."""
     with np.errstate(invalid="ignore"):
         return bound > margin + CHECK_ERROR * (1.0 + np.abs(margin))

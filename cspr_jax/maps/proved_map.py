@@ -1,4 +1,4 @@
-"""Base of maps of proved motions of any robot from given positions, with one orientation."""
+"""Base of maps of proved motions of any robot from given positions in one orientation."""
 
 import functools
 import operator
@@ -21,16 +21,16 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import FLAGS, pose_conditions
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
-# A cell shows a clearance if its verdict has no other flags than these.
+# A cell shows a clearance only if its verdict has no flags but these.
 _BESIDE = CONTACTS | Verdict.UNDECIDED | Verdict.UNCERTAINTY | Verdict.BELOW_FLOOR
 _COLUMNS = {"tension_margin": "margin", "tension_margin_bound": "margin_bound"}
 
 
 class ProvedMap(GridMap):
-    """The map of proved motions from one position to each target; see `GridMap`.
+    """A map of proved motions from given positions to each target; see `GridMap`.
 
     Fields:
-        from_rest: whether the start may be at rest in P0.
+        from_rest: whether the start may be given as rest in P0.
     """
 
     proves = True
@@ -38,7 +38,7 @@ class ProvedMap(GridMap):
     from_rest: ClassVar[bool] = False
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
-        """Refuse robots that no path moves, and starts without a position."""
+        """Refuse robots that no path can move, and starts without a position."""
         super().__init__(robot_file, spec, file)
         check_start(robot_file, spec, file, rests=self.from_rest)
         if robot_file.own_pattern == "1T" or PATTERNS[robot_file.own_pattern].is_jointed:
@@ -86,7 +86,7 @@ def proved_columns(answers: Answers) -> dict[str, np.ndarray]:
 
 
 def joined_columns(parts: list[tuple[np.ndarray, dict[str, np.ndarray]]]) -> dict[str, np.ndarray]:
-    """Columns of all cells from those of some."""
+    """Columns of all cells, joined from columns of parts of them."""
     joined = {name: np.empty(len(parts[0][0]), column.dtype) for name, column in parts[0][1].items()}
     for rows, columns in parts:
         for name, column in columns.items():

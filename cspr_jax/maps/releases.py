@@ -1,4 +1,4 @@
-"""Columns that launches to many landing points share, by whatever motion the object is released."""
+"""Columns of launches to many landing points, the same for all motions from which the object is released."""
 
 import dataclasses
 from typing import Self
@@ -11,16 +11,16 @@ from cspr_jax.schema.columns import Columns
 
 @dataclasses.dataclass(frozen=True)
 class Releases(Columns):
-    """Slowest releases to n landing points, (n,) each; NaN where there is none, except for the first two.
+    """Slowest releases to n landing points, (n,) each; NaN where there is none, except in the first two columns.
 
     Fields:
-        verdict: flags of `Verdict`: 0 where a launch was found.
-        largest_margin: largest margin of the motions that were tried.
-        release_speed: m/s.
-        flight_time: s.
-        release_x: of the position of the release, m.
-        release_y: likewise.
-        release_z: likewise.
+        verdict: flags of `Verdict`; 0 where a launch is found.
+        largest_margin: largest margin of all motions tried.
+        release_speed: speed at the release, m/s.
+        flight_time: time of flight, s.
+        release_x: x of the position of release, m.
+        release_y: y likewise.
+        release_z: z likewise.
     """
 
     verdict: np.ndarray
@@ -33,7 +33,7 @@ class Releases(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether a launch to each point was found, (n,); its motion is feasible."""
+        """Tell to which points a feasible launch is found, (n,)."""
         return self.verdict == 0
 
     @property
@@ -42,6 +42,6 @@ class Releases(Columns):
         return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
 
     def placed(self, frame: Frame) -> Self:
-        """The same, with the positions of the releases in other axes."""
+        """The same releases with their positions in other axes."""
         x, y, z = frame.outward(self.releases).T
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)

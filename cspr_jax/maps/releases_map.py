@@ -7,11 +7,11 @@ _START = ("from_x", "from_y", "from_z", "z")
 
 
 class ReleasesMap(FromPositionsMap):
-    """The map of slowest releases of a point mass from given positions; see `GridMap`."""
+    """A map of the slowest releases of a point mass from given positions; see `GridMap`."""
 
     any_cables = True
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse starts that are all out of reach; objects may land anywhere; see `GridMap.refuse_hopeless`."""
+        """Refuse a grid whose starts are all out of reach; objects may land anywhere; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")

@@ -1,4 +1,4 @@
-"""Plans of single cells of a map: the motion whose verdict, duration and margins the cell holds."""
+"""Plan of a single cell of a map: the motion whose verdict, duration and margins the cell holds."""
 
 import math
 from collections.abc import Mapping
@@ -14,16 +14,16 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
 
-# Quantities that fix the number of arcs, and how many arcs one is.
+# Quantities that fix the number of arcs, and how many arcs one unit of each is.
 COUNTS = {"arcs": 1, "tried_arcs": 1, "oscillations": 2, "tried_oscillations": 2}
-# Axes of an orientation; those that a map lacks are 0.
+# Axes of an orientation; an axis that a map lacks is 0.
 ORIENTATION = ("tilt_azimuth", "tilt", "torsion")
 
 
 def cell_plan(
     settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], *, samples: int = 120
 ) -> dict[str, Any] | None:
-    """Plan of the motion of one cell, as a plan file has it."""
+    """Plan of the motion of one cell, as in a plan file; None for maps whose cells are no motions."""
     kind = MAP_KINDS[settings["map"]]
     if not kind.planned:
         return None
@@ -62,7 +62,7 @@ def cell_plan(
 def _turn(
     settings: Mapping[str, Any], cell: Mapping[str, float], values: Mapping[str, Any], plan_file: Mapping[str, Any]
 ) -> dict[str, Any] | None:
-    # One turn on the ellipse of a cell.
+    # Plan one turn on the ellipse of a cell.
     table = SweepEllipse.model_validate(settings.get("ellipse") or {})
     robot = settings["robot"]
     axes = cell_axes(table, cell, is_planar=bool(robot.get("planar")) or robot.get("pattern") == "2T")
@@ -81,7 +81,7 @@ def _turn(
 def _path(
     settings: Mapping[str, Any], cell: Mapping[str, float], plan_file: Mapping[str, Any]
 ) -> dict[str, Any] | None:
-    # The path to the target of a cell.
+    # Plan the path to the target of a cell.
     start, end = _start(settings, cell), _target(settings, cell)
     robot, table = settings["robot"], TargetPath.model_validate(settings["trajectory"].get("path") or {})
     path = table.between(start["position"], end, robot.get("z_axis", "down"))
@@ -95,7 +95,7 @@ def _path(
 def _free(
     settings: Mapping[str, Any], cell: Mapping[str, float], plan_file: Mapping[str, Any]
 ) -> dict[str, Any] | None:
-    # The free motion to the target of a cell, which keeps the orientation.
+    # Plan the free motion to the target of a cell, which keeps the orientation.
     start, end = _start(settings, cell), _target(settings, cell)
     if "position" in start and math.dist(start["position"], end) <= SAME_PLACE:
         return None

@@ -22,14 +22,14 @@ from cspr_jax.robots.model.robot import Robot
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.families import FAMILIES
 
-# Relative distance of a conservative z0 above its bound.
+# A conservative z0 lies above its bound by this relative distance.
 ABOVE_BOUND = 1e-6
 EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
 
 
 def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
-    """The plan's z0, given or chosen."""
+    """The z0 of the plan, as given or chosen."""
     waypoints = sequence.waypoints
     plan_file, path, targets = waypoints.plan_file, waypoints.path, waypoints.targets
     if plan_file.z0 is None and not _needs_depth(waypoints):
@@ -62,7 +62,7 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
 
 
 def _needs_depth(waypoints: Waypoints) -> bool:
-    # Rests elsewhere than in P0 need no depth of P0.
+    # Motions whose rests need not be at P0 need no depth of P0.
     plan_file = waypoints.plan_file
     anywhere = all(FAMILIES[name].rests_anywhere for name in plan_file.families)
     return (
@@ -97,7 +97,7 @@ def _check_rest(robot: Robot, waypoints: Waypoints, z0: float) -> None:
 
 
 def nearly_resting(waypoints: Waypoints, z0: float) -> list[str]:
-    """Poses that differ from P0 only in their last digits."""
+    """Hints about poses that differ from P0 only in their last digits."""
     lines = [
         almost_at_rest(f"{waypoints.name(i)}.position", pose.position, z0, waypoints.robot_file)
         for i, pose in enumerate(waypoints.poses)
@@ -137,13 +137,13 @@ def _best_inclination(problem: Problem, waypoints: Waypoints) -> float:
         from cspr_jax.families.swings.transitions.oscillations import best_inclinations
 
         return float(best_inclinations(problem, target[None], max_arcs=waypoints.max_arcs)[0])
-    # The weights do not depend on the depth of P0.
+    # The weights do not depend on the depth of P0, so any depth does.
     one = transition(problem.robot, problem.amplitude, jnp.asarray(target), jnp.asarray(1.0))
     return float(best_inclination(problem.amplitude, weights(one))[0])
 
 
 def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
-    # The duration grows with the root of z0 between changes of the arcs: search coarsely, then finely near the best.
+    # While the arcs stay the same, the duration grows with the root of z0: search coarsely, then finely near the best.
     minimum = max(depths.least_depth(problem.robot, sequence.waypoints.targets), 1e-3)
     safe = depths.conservative_depth(problem.robot, sequence.waypoints.targets)
     trial = np.linspace(0.5 * minimum, max(1.5 * minimum, safe if np.isfinite(safe) else 0.0), DEPTHS)
@@ -160,7 +160,7 @@ def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
 
 
 def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitude, float]:
-    """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin."""
+    """The amplitude function with the epsilon of the shortest plan, and z0; among equals, that of largest margin."""
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
         amplitude = build_amplitude(sequence.waypoints.plan_file, sequence.waypoints.path, epsilon=float(epsilon))

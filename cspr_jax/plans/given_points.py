@@ -1,4 +1,4 @@
-"""Poses of a plan whose positions are those of the origin of a platform's axes, as poses of its mass centre."""
+"""Plans whose positions are those of the origin of the platform's axes, converted to positions of the mass centre."""
 
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,12 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import frame_of
 
-# Keys of plans and poses that refer to the mass centre, whatever point the positions of poses are of.
+# Keys that always refer to the mass centre, whatever point the positions of poses refer to.
 OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "acceleration")
 
 
 def with_mass_centres(robot_file: RobotFile, plan_file: PlanFile, path: Path) -> PlanFile:
-    """A plan whose poses have the positions of the mass centre."""
+    """The plan with positions of the mass centre; `plan_file.point` says which point its positions are of."""
     centre = centre_from(robot_file.as_written, plan_file.point)
     if centre is None or not centre.any():
         return plan_file
@@ -31,7 +31,7 @@ def with_mass_centres(robot_file: RobotFile, plan_file: PlanFile, path: Path) ->
     for i in placed:
         positions[i] = frame.inward(plan_file.pose[i].position)
     arm, units = frame.rotated(centre), None
-    shifts = np.broadcast_to(arm, positions.shape)  # of a platform that only translates
+    shifts = np.broadcast_to(arm, positions.shape)  # for a platform that only translates
     if robot_file.is_platform and placed:
         units = pose_quaternions(
             Waypoints(robot_file, plan_file, path, frame, plan_file.family, 0, len(positions) - 1), positions
@@ -42,7 +42,7 @@ def with_mass_centres(robot_file: RobotFile, plan_file: PlanFile, path: Path) ->
     for i in placed:
         changes = {"position": np.asarray(frame.outward(positions[i] + shifts[i])).tolist()}
         if poses[i].tilt_torsion is not None and units is not None:
-            # The direction from which the azimuth counts is that of the given position.
+            # The azimuth counts from a direction that depends on the given position: convert it to a quaternion.
             changes |= {"tilt_torsion": None, "quaternion": frame.rotated_quaternions(units[i]).tolist()}
         poses[i] = poses[i].model_copy(update=changes)
     return plan_file.model_copy(update={"pose": poses})

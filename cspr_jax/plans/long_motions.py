@@ -1,4 +1,4 @@
-"""Motions of tables that are too long to be held: checked window by window, as one plan of one segment."""
+"""Motions from tables too long to hold in memory: checked window by window, reported as a plan of one segment."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ from cspr_jax.verification.attained import attained
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proof_of
 from cspr_jax.verification.time_proof import TimeProof
 
-# Demands that are smallest values; the others are largest ones.
+# Of these quantities the smallest value of the motion counts, of all others the largest.
 SMALLEST = ("tension_min", "mu_min", "depth_min", "tension_margin", "are_found")
 
 
@@ -44,7 +44,7 @@ class _Window(NamedTuple):
 
 
 def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
-    """Plan of one motion of a long table, without the motion itself: nothing can be written of it."""
+    """Plan of one motion from a long table. It does not hold the motion, so no files can be written from it."""
     for key in ("smooth", "stretch"):
         if getattr(plan_file, key) is not None:
             raise ConfigError(path, f"{key}: must be absent in a table of so many rows")
@@ -123,7 +123,7 @@ def _merged(windows: list[_Window]) -> MotionProof:
 
 
 def _reduced(each: list[Peaks], starts: list[float]) -> Peaks:
-    # Extremes of windows that begin at these times, s.
+    # Extremes over windows that begin at these times, s.
     columns, worst = {}, []
     for name in EXTREMES:
         values = np.array([getattr(one, name)[0] for one in each])

@@ -1,4 +1,4 @@
-"""Plans: a sequence of poses, each segment with its smallest number of arcs and its demands on the robot."""
+"""Plans: sequences of poses; each segment has its smallest number of arcs and its peak values."""
 
 import dataclasses
 import itertools
@@ -31,7 +31,7 @@ from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
 
-# Details of segments that hold for cables from points alone.
+# Details of segments that hold only if cables run from points, not over pulleys.
 FROM_POINTS = (
     "det_margin",
     "det_sign_constant",
@@ -42,9 +42,9 @@ FROM_POINTS = (
     "envelope_oscillations",
     "least_oscillations",
 )
-# Value that a search for z0 takes for a "best" epsilon, until that is chosen.
+# Epsilon with which z0 is searched for before a "best" epsilon is chosen.
 FIRST_EPSILON = 0.2
-# Differences of positions over the robot's radius, and of accelerations over gravity, allowed where families change.
+# Relative jumps allowed where families change: of positions over the robot's radius, of accelerations over gravity.
 CONTINUOUS = 1e-9
 
 
@@ -53,19 +53,19 @@ class PlannedMotions:
     """A planned sequence.
 
     Fields:
-        robot_file: the robot as its file has it; or its equivalent, `config.equivalents`.
-        keys: the plan file.
-        problem: robot, limits, amplitude function; centred.
-        z0: m.
-        frame: of the robot file.
-        points: (n + 1, 3) in the axes of the robot file, m.
-        legs: consecutive segments of one family each, n segments in all.
-        demands: of the n segments; `lowest` is z in the axes of the robot file.
-        outcomes: results of the legs that have one beyond their motion.
-        causes: of the n segments, why each is not feasible, the worst cause first.
-        warnings: what its user should know, one line each.
-        text: of the plan file; empty for a plan that has none.
-        point: of the platform whose poses files and pictures of the plan hold, one of `config.motions.table.POINTS`.
+        robot_file: the robot as its file has it, or its equivalent from `config.equivalents`.
+        keys: content of the plan file.
+        problem: robot (centred), limits and amplitude function.
+        z0: depth of P0, m.
+        frame: frame of the robot file.
+        points: (n + 1, 3) positions of the poses in the axes of the robot file, m.
+        legs: consecutive segments of one family each; n segments in all.
+        demands: peaks of the n segments; `lowest` is z in the axes of the robot file.
+        outcomes: results of the legs that have more than a motion, as launches do.
+        causes: for each of the n segments, why it is not feasible, the worst cause first.
+        warnings: what the user should know, one line each.
+        text: text of the plan file; empty for a plan without a file.
+        point: point of the platform whose positions files and pictures hold, one of `config.motions.table.POINTS`.
     """
 
     robot_file: RobotFile
@@ -84,20 +84,20 @@ class PlannedMotions:
 
     @property
     def is_at_origin(self) -> bool:
-        """Tell whether what is written of the plan are poses of the platform's own axes; joints are their origin."""
+        """Tell whether files hold poses of the platform's own axes; a plan for joints then moves their origin."""
         row = PATTERNS[self.robot_file.own_pattern]
         return self.point == "origin" and row.is_body and not row.is_jointed
 
     @cached_property
     def answers(self) -> Answers:
-        """Answers of the n segments; of a plan of several legs, what every family says."""
+        """Answers of the n segments; for several legs, those columns that all families have."""
         if len(self.legs) == 1:
             return self.legs[0].answers
         names = [field.name for field in dataclasses.fields(Answers)]
         return joined([Answers(**{name: getattr(leg.answers, name) for name in names}) for leg in self.legs])
 
     def details(self, i: int) -> dict[str, Any]:
-        """Details of a segment that only its family has."""
+        """Details of a segment that only its family reports."""
         for leg in self.legs:
             if i < len(leg.motions):
                 details, pulleys = leg.answers.details(i), self.problem.robot.pulleys
@@ -117,7 +117,7 @@ class PlannedMotions:
 
     @cached_property
     def tension_margin(self) -> np.ndarray:
-        """Smallest distance of tensions from their limits, (n,) N: as proofs have it, else between samples."""
+        """Smallest distance of tensions from their limits, (n,) N: from proofs where there are any, else at samples."""
         margins = self.demands.tension_margin.copy()
         for i, proof in enumerate(self.answers.proof):
             if proof is not None and not proof.contacts_alone:
@@ -151,7 +151,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     legs_of = [FAMILIES[name].legs for name in plan_file.families]
     robot_file = as_moved(resolve_robot(plan_file.robot, path, path.parent), legs_of)
     if plan_file.point == "origin":
-        from cspr_jax.plans.given_points import with_mass_centres  # it loads pieces of SciPy
+        from cspr_jax.plans.given_points import with_mass_centres  # loads parts of SciPy
 
         plan_file = with_mass_centres(robot_file, plan_file, path)
     sequence = PlanLegs(robot_file, plan_file, path)
@@ -191,16 +191,16 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
 
 
 def _point(plan_file: PlanFile, sequence: PlanLegs) -> str:
-    # The point that the plan names, else that of its files, if it is the same of all.
+    # Take the point that the plan names, else the point of its motion files if all name the same one.
     points = {leg.point for leg in sequence.legs}
     return plan_file.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
 def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
-    # Families prove feasible motions faster; why one is not feasible is for the proof of any motion to say.
+    # Families prove feasible motions faster, but only the general proof says why a motion is not feasible.
     if leg.answers.feasible.all() and not any(proof is not None for proof in leg.answers.proof):
         return leg
-    # Feasible plans of such families need none of these.
+    # Imported here, since feasible plans do not need it.
     from cspr_jax.build.scenes import scene_of_leg
     from cspr_jax.verification.attained import with_attained
 
@@ -224,13 +224,13 @@ def _causes(frame: Frame, legs: tuple[JoinedLeg, ...]) -> tuple[tuple[Cause, ...
 def _extremes(
     problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], plan_file: PlanFile
 ) -> Peaks:
-    # Heights are in the axes of the robot file.
+    # Convert heights to the axes of the robot file.
     extremes = _peaks(problem, legs, plan_file, _shape(problem, robot_file, frame, plan_file))
     return dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
 
 
 def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: PlanFile) -> np.ndarray | None:
-    # Corners of the shape of a platform, where it is known.
+    # Return the corners of a platform's shape; None if the plan gives no shape.
     if plan_file.platform_box is None and plan_file.platform_hull is None:
         return None
     from cspr_jax.build.scenes import scene_of  # few plans have a shape
@@ -241,12 +241,12 @@ def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: Pla
 
 
 def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:
-    # Return the positions of all poses in the axes of the robot file, also of those that a motion decides.
+    # Return the positions of all poses in the axes of the robot file, even those that only a motion determines.
     waypoints = sequence.waypoints
     points = np.array(waypoints.frame.outward(waypoints.points(z0)))
     motions = [motion for leg in legs for motion in leg.motions]
     for i in waypoints.plan_file.resulting_poses:
-        # The first pose is where the motion begins.
+        # The first pose is the start of its segment, all others are ends.
         segment, end = (i - 1, 1.0) if i else (0, 0.0)
         points[i] = waypoints.frame.outward(states_at(motions[segment], np.array([end])).position[0])
     return points
@@ -279,7 +279,7 @@ def _check_rule(problem: Problem, plan_file: PlanFile, path: Path) -> None:
 
 
 def _missed(plan_file: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[str]:
-    # A rule that is not exact can find no tensions within the limits where there are some.
+    # A rule that is not exact may find no tensions within the limits although there are some.
     if TENSION_RULES[plan_file.tension_rule].is_exact:
         return []
     missed = np.flatnonzero(is_feasible & (extremes.are_found == 0.0)) + 1
@@ -299,19 +299,19 @@ def _peaks(problem: Problem, legs: tuple[JoinedLeg, ...], plan_file: PlanFile, c
 
 
 def _counts(leg: JoinedLeg, plan_file: PlanFile) -> np.ndarray:
-    # Count the times at which a search for extremes begins.
+    # Return the number of times at which the search for extremes starts.
     return np.maximum(SAMPLES * leg.answers.tried_arcs, plan_file.samples) + 1
 
 
 def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:
-    # Positions, velocities and accelerations must meet where another family goes on.
+    # Positions, velocities and accelerations must be continuous where the family changes.
     length, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
     scales = {"position": length, "velocity": np.sqrt(length * gravity), "acceleration": gravity}
     for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):
         ends = (before.motions[-1], 1.0), (after.motions[0], 0.0)
         last, first = (states_at(motion, np.array([tau]))[:3] for motion, tau in ends)
         if not np.isfinite([np.asarray(values) for values in (*last, *first)]).all():
-            continue  # there is no motion, as its verdict says
+            continue  # the verdict says why there is no motion
         for (name, scale), a, b in zip(scales.items(), last, first, strict=True):
             jump = float(np.abs(np.asarray(a) - np.asarray(b)).max())
             if not jump <= CONTINUOUS * scale:

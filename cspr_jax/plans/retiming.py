@@ -26,11 +26,11 @@ from cspr_jax.verification.proved_answers import proved_answers
 
 # A motion replaces the planned one if it saves this fraction of the duration.
 SMALLEST_GAIN = 1e-4
-# Fraction of the largest path speed of the search, above which a motion counts as not bounded by any limit.
+# A motion with a path speed above this fraction of the largest one searched counts as not bounded by any limit.
 UNBOUNDED = 0.5
-AWAY = 1e-6  # m; distance from the planned path above which the grid is doubled
-DOUBLINGS = 3  # at most
-# Accelerations at a pose may jump by this part of gravity.
+AWAY = 1e-6  # m; if the motion is farther from the planned path, its grid is doubled
+DOUBLINGS = 3  # largest number of doublings
+# Accelerations at a pose may jump by this fraction of gravity without a warning.
 JUMPS = 1e-6
 
 
@@ -39,10 +39,10 @@ class RetimedAnswers(PathAnswers):
     """Answers of segments that were retimed.
 
     Fields:
-        lower_bound: (n,) of the time along each path, s; NaN where none is known, or the motion passes a pose.
-        planned_duration: (n,) s.
-        deviation: (n,) largest distance from the planned path, at samples, m; 0 of a motion that stays as planned.
-        is_retimed: (n,) whether the motion is the faster one, and not that of the plan.
+        lower_bound: (n,) lower bound of the time along each path, s; NaN without one, or if the motion passes a pose.
+        planned_duration: (n,) duration before retiming, s.
+        deviation: (n,) largest distance from the planned path at samples, m; 0 for a motion that stays as planned.
+        is_retimed: (n,) whether the motion is the faster one and not the planned one.
     """
 
     lower_bound: np.ndarray
@@ -51,7 +51,7 @@ class RetimedAnswers(PathAnswers):
     is_retimed: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """Durations before and after, the distance from the planned path, bounds; see `Answers.details`."""
+        """Durations before and after, deviation from the planned path, bounds; see `Answers.details`."""
         duration, bound, planned = (float(x[i]) for x in (self.duration, self.lower_bound, self.planned_duration))
         return super().details(i) | {
             "lower_bound": bound,
@@ -64,7 +64,7 @@ class RetimedAnswers(PathAnswers):
 
 
 class _Faster(NamedTuple):
-    # The fastest motion along a path, and its largest distance from the planned one, m.
+    # A fastest motion along a path; `deviation` is its largest distance from the planned motion, m.
     ride: Ride
     fastest: LeastTime
     deviation: float
@@ -73,8 +73,8 @@ class _Faster(NamedTuple):
 def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> PlannedMotions:
     """A plan whose motions run along their paths in the least time.
 
-    Between two poses at rest the new motion replaces the planned one if it is proved, and either faster, or in place of
-    one that is not feasible.
+    Between two poses at rest, new motions replace the planned ones if they are proved and either faster or in place of
+    motions that are not feasible.
     """
     motions = [motion for leg in plan.legs for motion in leg.motions]
     _check(plan, motions, path)
@@ -101,7 +101,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
 
 
 def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:
-    # Feeds that the motions of a plan keep.
+    # Return the feeds that each motion of a plan keeps.
     return [getattr(proof, "feeds", None) for leg in plan.legs for proof in leg.answers.proof]
 
 
@@ -122,7 +122,7 @@ def _check(plan: PlannedMotions, motions: list[Motion], path: Path) -> None:
 
 
 def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_time: float) -> list[_Faster]:
-    # Fastest motions along paths, on finer grids where they are too far from their paths.
+    # Find the fastest motions along paths; refine the grids of those that deviate too far.
     answers, rows = dict[int, _Faster](), list(range(len(paths)))
     for doubling in range(DOUBLINGS):
         chosen = [paths[k] for k in rows]
@@ -139,7 +139,7 @@ def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_ti
 
 
 def _answers(plan: PlannedMotions, faster: Sequence[_Faster], proved: Answers, is_better: np.ndarray) -> RetimedAnswers:
-    # Sections are reported for retimed motions only, bounds for all.
+    # Report sections for retimed motions only, bounds for all.
     count = len(is_better)
     bound, deviation = np.zeros(count), np.zeros(count)
     sections = np.empty(count, object)
@@ -163,7 +163,7 @@ def _answers(plan: PlannedMotions, faster: Sequence[_Faster], proved: Answers, i
 
 
 def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]) -> np.ndarray:
-    # Motions (n,) that replace those of the plan: all of those between two poses at rest, or none.
+    # Tell which of the n motions replace the planned ones: between two poses at rest, all or none.
     before, after = np.array(plan.answers.duration), answers.duration
     group = np.arange(len(before))
     for segments in (one.ride.segments for one in faster):
@@ -179,7 +179,7 @@ def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]
 def _with_planned(
     plan: PlannedMotions, scene: Scene, answers: Answers, motions: list[Motion], rows: np.ndarray
 ) -> Answers:
-    # Answers with those of the planned motions in `rows`, which are feasible if their family has proved so.
+    # Replace answers by those of the planned motions in `rows`; a motion that its family has proved stays feasible.
     if not len(rows):
         return answers
     feeds = _feeds(plan)
@@ -195,7 +195,7 @@ def _stays(is_kept: np.ndarray) -> list[str]:
 
 
 def _jumps(plan: PlannedMotions, faster: list[_Faster], is_better: np.ndarray) -> list[str]:
-    # Tensions jump where a motion turns back at a position at which the robot cannot rest.
+    # Warn of tensions that jump where the motion turns back at a position at which the robot cannot rest.
     largest, gravity = 0.0, float(plan.problem.robot.gravity)
     for before, after in itertools.pairwise(faster):
         if is_better[before.ride.segments[-1]] and is_better[after.ride.segments[0]]:

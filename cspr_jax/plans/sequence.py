@@ -1,4 +1,4 @@
-"""Sequence of a plan: its poses, in legs of one family each."""
+"""Sequence of a plan: its poses, grouped in legs of one family each."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ class PlanLegs:
     """Poses of a plan.
 
     Args:
-        path: named in errors.
+        path: of the plan file, named in errors.
 
     Fields:
         waypoints: all poses.
-        legs: in their order; each begins where the one before ends.
+        legs: in order; each begins where the previous one ends.
 
     Raises:
-        ConfigError: poses that their families cannot join.
+        ConfigError: a family cannot join its poses.
     """
 
     def __init__(self, robot_file: RobotFile, plan_file: PlanFile, path: Path) -> None:
-        """Refuse poses without a position, and families that do not move the robot."""
+        """Refuse poses without a position, and families that cannot move the robot."""
         _check_families(robot_file, plan_file, path)
         _check_keys(plan_file, path)
         _check_poses(robot_file, plan_file, path)
@@ -74,11 +74,11 @@ def _verified(leg: Leg) -> Leg:
 
 
 def _others(waypoints: Waypoints) -> list[Leg]:
-    # Legs over the same poses of the families from whose motions searches begin.
+    # Make legs over the same poses from the families whose motions are starting points of searches.
     pattern, legs = waypoints.robot_file.own_pattern, list[Leg]()
     for row in FAMILIES.values():
         if row.begins_searches and pattern in row.legs:
-            with contextlib.suppress(ConfigError):  # of poses that the family does not join
+            with contextlib.suppress(ConfigError):  # the family cannot join these poses
                 legs.append(_verified(row.leg(pattern).for_searches(dataclasses.replace(waypoints, family=row.name))))
     return legs
 

@@ -1,8 +1,8 @@
-"""Legs of families that ignore obstacles and pulleys: each motion is proved with both once it is made.
+"""Legs of families that ignore obstacles and pulleys: each motion, once made, is proved with both.
 
-See `verification.verifier`. Where numbers of arcs are free, the smallest number that is proved is taken: of point
-masses (over pulleys, only with as many cables as degrees of freedom), and of platforms without pulleys in legs of one
-segment. Others keep the number that their family chooses.
+See `verification.verifier`. Where the number of arcs is free, the smallest number with a proof is taken: for point
+masses (over pulleys, only with as many cables as degrees of freedom), and for platforms without pulleys in legs of one
+segment. All other motions keep the number of arcs that their family chooses.
 """
 
 import copy
@@ -22,15 +22,15 @@ from cspr_jax.verification.verifier import Verifier
 
 
 class VerifiedLeg(Leg):
-    """Leg of a family, its motions proved with obstacles and pulleys; see `Leg`."""
+    """Leg of a family whose motions are proved with obstacles and pulleys; see `Leg`."""
 
     def __init__(self, leg: Leg) -> None:
-        """Keep the leg of the family."""
+        """Wrap the leg of a family."""
         super().__init__(leg.waypoints)
         self._leg = leg
 
     def check(self, problem: Problem) -> None:
-        """Ask the family; see `Leg.check`."""
+        """Let the family check the problem; see `Leg.check`."""
         self._leg.check(_from_points(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
@@ -42,11 +42,11 @@ class VerifiedLeg(Leg):
         return self._leg.warnings(_from_points(problem))
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
-        """Result by the family's answers; see `Leg.result`."""
+        """Result from the family's answers; see `Leg.result`."""
         return self._leg.result(problem, joined, tension_min, start)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
-        """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
+        """Join the poses by proved motions where there are any; see `Leg.join`."""
         waypoints, plain, prescribed = self.waypoints, _from_points(problem), self.waypoints.arcs
         verifier = Verifier(
             problem,
@@ -91,7 +91,7 @@ def _from_points(problem: Problem) -> Problem:
 
 
 def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> Answers:
-    # Over pulleys margins are those of the proofs: motions that the family refuses have none.
+    # Over pulleys, take the margins from the proofs; motions that the family refuses have none.
     each = np.empty(len(proofs), object)
     each[:] = proofs
     if not has_pulleys:

@@ -1,1 +1,1 @@
-"""Tables of the source texts, computed beside the printed ones."""
+"""Tables of the source texts: computed cells beside the printed ones."""

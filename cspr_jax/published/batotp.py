@@ -1,8 +1,8 @@
 """Sample CSPR3DOF of batotp: a point mass on three cables along a cubic spline, from rest to rest in the least time.
 
-Data and settings are in `batotp_sample.toml`, with their source. The motion of this module takes less time than
-batotp's and is proved to keep all limits, some of which the output of batotp (not in this package) breaks; a lower
-bound holds for all motions along the same path.
+`batotp_sample.toml` holds data and settings, and names their source. The motion found here takes less time than
+batotp's and is proved to keep all limits; the output of batotp (not in this package) breaks some of them. A lower bound
+holds for all motions along the same path.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ from cspr_jax.robots.model.point_mass import point_mass_robot
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.proved_answers import proved_answers
 
-# 200 cells for each segment, as many as its file has.
+# 200 cells for each segment, as in the sample of batotp.
 CELLS = 3800
 VARIANT = "batotp's sample CSPR3DOF"
 PUBLISHED = {
@@ -40,7 +40,7 @@ def sample() -> dict[str, Any]:
 
 
 def least_time(cells: int = CELLS) -> dict[Key, float | None]:
-    """The proved time along the path, beside both printed ones, and the lower bound of all motions' times."""
+    """The proved time along the path, under both printed ones as keys, and a lower bound of the time of all motions."""
     spec = sample()
     robot, frame = centred(point_mass_robot(spec["base_points"], mass=1.0, gravity=spec["gravity"]))
     problem = Problem(robot, _limits(spec["limits"], robot.n_cables), named("quintic"))
@@ -56,7 +56,7 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
 
 
 def _limits(spec: dict[str, float], n_cables: int) -> Limits:
-    # The effector has 1 kg, so that tensions over the mass are tensions.
+    # Limits are tensions over the mass; with a mass of 1 kg they are tensions.
     def of_cables(name: str):
         return as_float64(np.full(n_cables, spec[name]))
 

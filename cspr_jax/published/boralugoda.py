@@ -23,19 +23,19 @@ from cspr_jax.robots.model.point_mass import PointMassRobot
 CASE, PRINTED = (Path(__file__).with_name(name) for name in ("table_4_1.toml", "table_4_3.csv"))
 TIMES = np.round(np.arange(2.9, 4.401, 0.05), 2)
 PERIODS = np.round(np.arange(1.8, 2.751, 0.05), 2)
-# The printed search has boundaries of so many decimals: with exact ones 236 of 1,240 cells differ in the last digit.
+# The printed search rounds boundaries to this many decimals; exact ones change the last digit of 236 of 1,240 cells.
 DECIMALS = 5
 EXACT, ROUNDED = "exact boundaries", "boundaries of five decimals"
-# No reading of T and p gives all of the printed accelerations: 0.896 follows from exact ones, 1.752 from printed ones.
+# Neither reading of T and p reproduces all printed accelerations: 0.896 follows from exact, 1.752 from rounded times.
 EXACT_TIMES, ROUNDED_TIMES = "exact T and p", "T and p of three decimals"
 
 
 class PublishedLine(NamedTuple):
-    """A boundary of the path acceleration: start + gradient * s.
+    """A boundary line of the path acceleration: start + gradient * s.
 
     Fields:
-        start: 1/s^2.
-        gradient: 1/s^2.
+        start: value at s = 0, 1/s^2.
+        gradient: derivative with respect to s, 1/s^2.
     """
 
     start: float
@@ -43,7 +43,7 @@ class PublishedLine(NamedTuple):
 
 
 def _case() -> tuple[Sides, float]:
-    # Bounds of the path acceleration of the test case, and the largest one.
+    # Return the bounds of the path acceleration in the test case, and the largest path acceleration.
     spec = read_plan(read_text(CASE), CASE)
     robot_file = resolve_robot(spec.robot, CASE, CASE.parent)
     start, end = PlanLegs(robot_file, spec, CASE).waypoints.points(float("nan"))
@@ -62,11 +62,11 @@ _laws = jax.jit(jax.vmap(s_curve))
 
 
 def _active() -> tuple[PublishedLine, PublishedLine, float]:
-    # (24) and (25): the boundaries that hold the least time back, and the largest path acceleration.
+    # Return (24) and (25), the boundaries that limit the least time, and the largest path acceleration.
     bounds, largest = _case()
     minimum = _minimum_curve(bounds)
     up, down = int(minimum.up), int(minimum.down)
-    # Braking is seen from the end.
+    # The lower boundary is a function of the distance from the end: express it in s.
     gradient = float(bounds.down_change[down])
     lower = PublishedLine(-float(bounds.down[down]) - gradient, gradient)
     return PublishedLine(float(bounds.up[up]), float(bounds.up_change[up])), lower, largest
@@ -89,7 +89,7 @@ def table_4_1() -> dict[Key, float | None]:
 
 
 def table_4_2() -> dict[Key, float | None]:
-    """The acceleration s'' = slope t + intercept of the least time, range by range."""
+    """The acceleration s'' = slope t + intercept of the motion of least time, interval by interval."""
     minimum = _minimum_curve(_case()[0])
     exact = float(minimum.duration), float(minimum.duration * minimum.ratio)
     cells: dict[Key, float | None] = {}
@@ -105,7 +105,7 @@ RANGES = ("0 <= t < 1.120", "1.120 <= t < 2.240", "2.240 <= t < 3.308", "3.308 <
 
 
 def table_4_3() -> dict[Key, float | None]:
-    """The search over p and T: how far the S-model passes the boundaries, and the first node where it does not."""
+    """The search over p and T: how far the S-model exceeds the boundaries, and the first node where it does not."""
     upper, lower, largest = _active()
     cells: dict[Key, float | None] = {}
     for reading, decimals in ((EXACT, None), (ROUNDED, DECIMALS)):
@@ -122,7 +122,7 @@ def table_4_3() -> dict[Key, float | None]:
 
 
 def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    # Return for each duration and p how far s'' passes its upper boundary at most, and from p on its lower one.
+    # Return by how much s'' exceeds its upper boundary for each T and p, and from time p on its lower one.
     time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
     laws = jax.tree.map(np.asarray, _laws(jnp.asarray(p / time)))
     edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)
@@ -142,7 +142,7 @@ def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple
 
 
 def _largest(curve: np.ndarray, spans: np.ndarray) -> np.ndarray:
-    # Return the largest values of cubics without a square, (4, n, n_pieces), over their spans, (2, n, n_pieces).
+    # Return the maxima of cubics without a square term, (4, n, n_pieces), over their spans, (2, n, n_pieces).
     square = -curve[1] / np.where(curve[3] != 0.0, 3.0 * curve[3], np.inf)
     stationary = np.sqrt(np.maximum(square, 0.0))
     points = np.clip(np.stack([spans[0], spans[1], stationary, -stationary]), spans[0], spans[1])
@@ -156,7 +156,7 @@ def _printed() -> dict[Key, str]:
         part, time = row.pop("part"), row.pop("T")
         for p, text in row.items():
             value = float(text)
-            # Trailing zeros are missing in print; below zero the second part has four decimals, too.
+            # The print omits trailing zeros; negative values have four decimals in the second part, too.
             digits = 5 if part == "Max_b" and value > 0.0 else 4
             for reading in (EXACT, ROUNDED):
                 cells[f"T={time}", f"{part} p={p}", reading] = f"{value:.{digits}f}"

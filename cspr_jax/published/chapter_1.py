@@ -1,4 +1,4 @@
-"""Tables 1.1 to 1.3 of the thesis: real numbers of oscillations that the envelopes ask for."""
+"""Tables 1.1 to 1.3 of the thesis: real numbers of oscillations that the envelopes require."""
 
 import math
 
@@ -23,7 +23,7 @@ from cspr_jax.motion.amplitudes import Amplitude, named
 from cspr_jax.runtime.stages import stage
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one reading
-DISTANCE = 4.0  # of Table 1.1, in radii of the spools
+DISTANCE = 4.0  # of the target of Table 1.1 from P0, in radii of the spools
 _READINGS = {"w_max = 5 sqrt(3)": 5.0 * math.sqrt(3.0), "w_max = 10": 10.0}
 
 
@@ -32,7 +32,7 @@ def _horizontal(amplitude: Amplitude, w: Array) -> float:
 
 
 def _weights(name: str, direction: list[float]) -> Array:
-    # Return the weights of a robot of the catalogue for a target on the level of p0; they are the same whatever z0.
+    # Return the weights of a robot of the catalogue for a target on the level of P0; they do not depend on z0.
     path = CATALOGUE / f"{name}.toml"
     robot = kernel_robot(read_robot(path), TrajectoryKeys(), path)
     radius = np.linalg.norm(np.asarray(robot.base_points)[0, :2])
@@ -42,7 +42,7 @@ def _weights(name: str, direction: list[float]) -> Array:
 
 
 def table_1_1() -> dict[Key, float | None]:
-    """Planar and spatial robots, a target at a distance of four radii on the level of p0, with A1."""
+    """Numbers for planar and spatial robots; the target is four radii away on the level of P0, the amplitude is A1."""
     cases = {
         "Planar": _weights("transition-planar", [1.0, 0.0]),
         "H_0": _weights("transition-prototype", [1.0, 0.0]),  # between two spools
@@ -57,7 +57,7 @@ def table_1_1() -> dict[Key, float | None]:
 
 
 def table_1_2() -> dict[Key, float | None]:
-    """Inclinations, for the target that gains most by them: sigma R = 1, xi = 1 of (1.114)."""
+    """Numbers by inclination, for the target that gains most from it: sigma R = 1, xi = 1 of (1.114)."""
     w = jnp.array([1.0, 1.0, -2.0])
     cells: dict[Key, float | None] = {}
     for name in ("A1", "A2", "A3"):
@@ -78,7 +78,7 @@ def table_1_2() -> dict[Key, float | None]:
 
 
 def table_1_3() -> dict[Key, float | None]:
-    """Amplitude functions, for a far target, in both readings of where it is."""
+    """Numbers by amplitude function for a far target, in both readings of its position."""
     cells: dict[Key, float | None] = {}
     for reading, largest in _READINGS.items():
         w = jnp.array([largest, -largest, 0.0])
@@ -94,7 +94,7 @@ def table_1_3() -> dict[Key, float | None]:
     return cells
 
 
-# As printed, digit by digit.
+# Copied digit by digit from print.
 PUBLISHED: dict[str, dict[Key, str]] = {
     "1.1": {("n", "Planar", ""): "2.15", ("n", "H_0", ""): "3.86", ("n", "H_1", ""): "4.47"},
     "1.2": {

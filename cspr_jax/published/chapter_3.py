@@ -1,6 +1,6 @@
-"""Table 3.3 of the thesis: accessible orientations of a position, and how many of them are attainable.
+"""Table 3.3 of the thesis: accessible orientations of a position, and how many of them are attained.
 
-Sets of orientations are found and tried by one process or by several; Table 3.4 (`table_3_4`) asks for them too.
+One process or several find and try sets of orientations; Table 3.4 (`table_3_4`) uses them too.
 """
 
 import dataclasses
@@ -31,8 +31,8 @@ from cspr_jax.runtime.stages import within
 
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20
-DIVISIONS = 32  # of pi
-TOGETHER = 1_000_000  # orientations are tried at a time, or some more: positions are not split
+DIVISIONS = 32  # steps of angles are pi / DIVISIONS
+TOGETHER = 1_000_000  # orientations tried at a time; a batch may exceed it, as positions are not split
 AMPLITUDES: dict[str, tuple[str, float | None]] = {
     "quintic": ("quintic", None),
     "effective": ("effective", 0.1),
@@ -47,8 +47,8 @@ class TableSettings:
     """Settings of a table of orientations.
 
     Fields:
-        definitions: of the accessible set, of `families.platforms.orientations.accessible.DEFINITIONS`.
-        amplitudes: of `AMPLITUDES`.
+        definitions: definitions of the accessible set, of `families.platforms.orientations.accessible.DEFINITIONS`.
+        amplitudes: names of amplitude functions, of `AMPLITUDES`.
         finer: factor by which the step is finer than pi / 32.
         max_arcs: largest number of arcs tried.
         values: number of values of beta-hat tried at each orientation.
@@ -65,14 +65,14 @@ USUAL = TableSettings()
 
 
 def variant(definition: str, amplitude: str) -> str:
-    """Settings with which a cell was computed."""
+    """Name of the settings with which a cell is computed."""
     epsilon = AMPLITUDES[amplitude][1]
     return f"amplitude = {amplitude}{f' {epsilon:g}' if epsilon else ''}; definition = {definition}"
 
 
 @functools.lru_cache(maxsize=len(AMPLITUDES))
 def checker_of(amplitude: str) -> PlatformChecker:
-    """Checker of the tables' motions."""
+    """Checker of the motions of the tables."""
     current = Path(__file__)
     robot = kernel_robot(resolve_robot("laval-mssm", current, current.parent), TrajectoryKeys(), "laval-mssm")
     problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
@@ -86,7 +86,7 @@ def attained(
     choice: TableSettings = USUAL,
     tried: np.ndarray | None = None,
 ) -> list[np.ndarray]:
-    """Orientations that horizontal transitions attain; the centroid of the spools is the origin."""
+    """Orientations that horizontal transitions attain; positions are relative to the centroid of the spools."""
     orientation_counts = [len(angles) for _, angles in sets]
     positions = np.repeat([position for position, _ in sets], orientation_counts, axis=0)
     symmetry = symmetries(checker.problem.robot)
@@ -106,7 +106,7 @@ def attained(
 
 
 def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarray, int]]) -> list[Accessible]:
-    """Accessible orientations of positions, in whichever process."""
+    """Accessible orientations of positions; any process can call it."""
     with double_precision():
         return accessible_sets(checker_of(amplitude).problem.robot, grids, definition)
 
@@ -114,7 +114,7 @@ def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarr
 def attained_there(
     amplitude: str, choice: TableSettings, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[np.ndarray]:
-    """Orientations that horizontal transitions attain, in whichever process."""
+    """Orientations that horizontal transitions attain; any process can call it."""
     run = np.cumsum(orientation_counts(sets)) // TOGETHER
     with double_precision():
         groups = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
@@ -122,20 +122,20 @@ def attained_there(
 
 
 def orientation_counts(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
-    """Numbers of orientations, by which work on sets is spread."""
+    """Numbers of orientations, which decide how sets are divided among processes."""
     return [len(angles) for _, angles in sets]
 
 
 def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
-    """Counts and proportions at four positions; errors are differences from twice the step."""
+    """Counts and proportions at four positions; errors are differences from results with the double step."""
     cells: dict[Key, float | None] = {}
-    # The step of the table, and twice that for the errors.
+    # The step of the table, and its double for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]
     positions = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in POSITIONS.values()]
     with Spread(workers) as spread:
         for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
             with within(f"{amplitude}, {definition}"):
-                # All sets go together, so that batches are full.
+                # Submit all sets together, so that batches are full.
                 requests = [(position, n) for n in steps for position in positions]
                 sets = spread(partial(accessible_there, amplitude, definition), requests, [n**3 for _, n in requests])
                 angles = [(position, inside.angles) for (position, _), inside in zip(requests, sets, strict=True)]

@@ -1,7 +1,7 @@
-"""Workspaces that papers on other tools compute: counts of poses, and times beside other methods.
+"""Workspaces that papers on other programs compute: counts of poses, and times beside other methods.
 
-The grids are those of CASPR (Lau et al., IROS 2016, Table I: IPAnema 2, wrench closure, for which it prints 89 to
-455 s), of CASPR's model of IPAnema 1, and of the CoGiRo robot in cdpyr. No source prints the counts of poses.
+The grids are those of CASPR (Lau et al., IROS 2016, Table I: IPAnema 2, wrench closure, printed times 89 to 455 s), of
+CASPR's model of IPAnema 1, and of the CoGiRo robot in cdpyr. No source prints counts of poses.
 """
 
 import time
@@ -21,19 +21,19 @@ from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Poses, evenly over the grid, that linear programs and least squares decide too.
+# Number of poses, evenly over the grid, that linear programs and least squares check too.
 SAMPLE = 60
 MICRO = 1e6
 
 
 class PoseGrid(NamedTuple):
-    """Poses of a study.
+    """A study: one condition on a grid of poses.
 
     Fields:
-        name: of the row.
-        robot: of the catalogue.
-        condition: of `workspaces.requirements.CONDITIONS`.
-        positions: (n, 3) of the platform frame's origin, axes of the file, m.
+        name: name of its row in the table.
+        robot: name in the catalogue.
+        condition: one of `workspaces.requirements.CONDITIONS`.
+        positions: (n, 3) of the origin of the platform's axes, in the axes of the file, m.
         quaternions: (n, 4) unit quaternions, scalar first.
     """
 
@@ -49,12 +49,12 @@ def _product(*axes: np.ndarray) -> np.ndarray:
 
 
 def _quaternions(angles: np.ndarray) -> np.ndarray:
-    # In the convention of CASPR: R = Rx Ry Rz.
+    # CASPR's convention is R = Rx Ry Rz.
     return Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
 
 
 def grids() -> list[PoseGrid]:
-    """The studies."""
+    """All studies."""
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
     tilted = np.repeat(_quaternions(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
     studies = [
@@ -77,10 +77,10 @@ def grids() -> list[PoseGrid]:
 
 
 def peers() -> dict[Key, float | None]:
-    """The table: poses, those inside and on the boundary, and microseconds for a pose by three methods.
+    """The table: numbers of poses, of those inside and on the boundary, and microseconds a pose by three methods.
 
-    The first poses, with which programs are compiled, are timed as well; those of linear programs (HiGHS) and of least
-    squares (NNLS) are some of the grid, in the same run.
+    Times include the first poses, for which programs are compiled. Linear programs (HiGHS) and least squares (NNLS)
+    check some poses of the grid in the same run.
     """
     cells: dict[Key, float | None] = {}
     for grid in grids():

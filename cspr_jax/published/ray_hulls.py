@@ -1,10 +1,10 @@
-"""WireX's workspace of IPAnema1Design: its hull along rays, by tensions in closed form and by all tensions.
+"""WireX's workspace of IPAnema1Design: its hull along rays, with closed-form tensions and with all tensions.
 
-WireX (github.com/gldkhoward/WireX, MIT) prints volume and surface in its README; robot, limits and method are those of
-its source text. No wrench has to be supplied. From a centre, rays go through the corners of an octahedron whose
-triangles are divided three times, and are halved from 12 m down until 0.1 mm are left; what the ends of the rays span
-is the hull. A pose is inside if the tensions of the closed form, the nearest to the middles of their ranges, keep the
-limits. Other tensions may keep them where these do not, so that the workspace itself is larger.
+WireX (github.com/gldkhoward/WireX, MIT) prints volume and surface in its README; robot, limits and method are from its
+source text. No external wrench acts. Rays from a centre go through the corners of an octahedron whose triangles are
+divided three times; the boundary on each ray is bisected from 12 m down to 0.1 mm, and the ends of the rays span the
+hull. A pose is inside if the closed-form tensions, those nearest to the middles of their ranges, keep the limits. Other
+tensions may keep them where these do not, so the workspace itself is larger.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ LOW, HIGH = np.full(8, 1.0), np.full(8, 10.0)
 CENTRE, LONGEST, CLOSE = np.array([0.0, 0.0, 1.0]), 12.0, 1e-4
 DIVISIONS, FINE, BATCH = 3, 6, 2048
 VARIANT = "WireX's hulls of IPAnema1Design"
-# Rounded here; WireX prints 5.731436529861277 and 17.789244457956457.
+# Rounded; WireX prints 5.731436529861277 and 17.789244457956457.
 PUBLISHED = {("closed form", "volume, m3", VARIANT): "5.7314365", ("closed form", "surface, m2", VARIANT): "17.7892445"}
 Inside = Callable[[np.ndarray], np.ndarray]
 
@@ -66,7 +66,7 @@ def hull(inside: Inside, divisions: int) -> tuple[float, float]:
 
 
 def _directions(divisions: int) -> np.ndarray:
-    # Corners of triangles, (n, 3, 3), counterclockwise as seen from outside.
+    # Return triangles by their corners, (n, 3, 3), counterclockwise as seen from outside.
     octants = np.stack(np.meshgrid(*[[1.0, -1.0]] * 3), axis=-1).reshape(-1, 3)
     order = np.where(octants.prod(1) > 0.0, 1, -1)
     triangles = np.stack([np.diag(signs)[::k] for signs, k in zip(octants, order, strict=True)])
@@ -80,7 +80,7 @@ def _directions(divisions: int) -> np.ndarray:
 
 
 def _conditions() -> tuple[Inside, Inside]:
-    # The conditions of the closed form and of all tensions. Without a wrench mass and inertia do not matter.
+    # Return the conditions for closed-form and for all tensions. Mass and inertia do not matter without a wrench.
     robot, frame = centred(platform_robot(BASE, PLATFORM, mass=1.0, inertia=np.eye(3), z_axis="up"))
     wrenches = required_wrenches(robot, frame, points=np.zeros((1, 6)))
     demand = requirement(robot, FEASIBLE, Limits(tension_min=as_float64(LOW), tension_max=as_float64(HIGH)), wrenches)

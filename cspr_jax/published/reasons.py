@@ -1,4 +1,4 @@
-"""Why cells of a published table differ from what is computed, and which reading of the source its numbers fit."""
+"""Why cells of a published table differ from the computed ones, and which reading of the source fits its numbers."""
 
 from typing import NamedTuple
 
@@ -6,13 +6,13 @@ from cspr_jax.outputs.table_layout import Cell
 
 
 class Reason(NamedTuple):
-    """Why some cells differ: an error of the source, or a choice that it does not name.
+    """Why some cells differ: an error of the source, or a choice that the source does not state.
 
     Fields:
         text: one line.
-        rows: of these cells; empty: of any row.
-        columns: likewise.
-        variant: part of the names of their variants.
+        rows: rows of these cells; empty: any row.
+        columns: columns of these cells; empty: any column.
+        variant: part of the name of the variants of these cells.
     """
 
     text: str
@@ -21,12 +21,12 @@ class Reason(NamedTuple):
     variant: str = ""
 
     def covers(self, cell: Cell) -> bool:
-        """Tell whether it is about a cell."""
+        """Tell whether the reason is about a cell."""
         is_there = (not self.rows or cell.row in self.rows) and (not self.columns or cell.column in self.columns)
         return is_there and self.variant in cell.variant
 
 
-# Variant of a table whose numbers the printed ones fit best.
+# For each table, the variant that fits the printed numbers best.
 READINGS = {
     "1.3": "w_max = 5 sqrt(3)",
     "3.2": "amplitude = effective-c3 0.1; pose_2 = pi/3",
@@ -38,7 +38,7 @@ _PROPORTIONS = (
     "proportions depend on the amplitude function (see Table 3.2), and on the arcs and values of beta-hat that are "
     "tried, which the text does not say"
 )
-# The first reason that covers a cell is that of the cell. The errors of the sources are listed in docs/sources.md.
+# The first reason that covers a cell applies. The errors of the sources are listed in docs/sources.md.
 REASONS: dict[str, tuple[Reason, ...]] = {
     "1.2": (
         Reason(

@@ -12,13 +12,13 @@ from cspr_jax.published.chapter_1 import Key
 from cspr_jax.runtime.stages import within
 
 SEQUENCE = Path(__file__).with_name("table_3_2.toml")
-# The text names the quintic; its numbers fit the others. Which epsilon was used is not printed.
+# The text names the quintic; the numbers fit the others. The epsilon used is not printed.
 _AMPLITUDES: dict[str, Any] = {
     "quintic": "quintic",
     "effective 0.1": {"name": "effective", "epsilon": 0.1},
     "effective-c3 0.1": {"name": "effective-c3", "epsilon": 0.1},
 }
-# Torsion of pose 2: as printed, neither of its segments has a feasible number of arcs.
+# Torsion of pose 2: with the printed one, neither of its segments has a feasible number of arcs.
 _TORSIONS = {"pi/3": math.pi / 3.0, "pi/2 (printed)": math.pi / 2.0}
 _POSE = 2
 
@@ -36,7 +36,7 @@ def table_3_2() -> dict[Key, float | None]:
             changed = copy.deepcopy(data)
             changed["amplitude"] = key
             changed["pose"][_POSE]["tilt_torsion"][2] = angle
-            # A segment depends on its two poses alone: only those at pose 2 are planned again.
+            # Only the segments at pose 2 differ, since a segment depends on its two poses alone.
             first = _POSE - 1 if segments else 0
             changed["pose"] = changed["pose"][first : _POSE + 2] if segments else changed["pose"]
             with within(f"{amplitude} ({number + 1} of {len(_AMPLITUDES)}), pose 2 {torsion}"):

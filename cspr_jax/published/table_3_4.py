@@ -1,4 +1,4 @@
-"""Table 3.4 of the thesis: smallest part of the accessible orientations of a position that is attained."""
+"""Table 3.4 of the thesis: smallest fraction of the accessible orientations of a position that is attained."""
 
 import itertools
 import math
@@ -34,9 +34,9 @@ def smallest_proportions(
     annuli: Sequence[Sets],
     values: int = attainable.VALUES,
 ) -> list[float]:
-    """Smallest part of the orientations of a position that horizontal transitions attain, in each of many annuli.
+    """Smallest fraction of the orientations of a position that horizontal transitions attain, in each of many annuli.
 
-    Other values of beta-hat than the preferred one are tried only at positions that could have the smallest proportion.
+    Values of beta-hat other than the preferred one are tried only where a position may have the smallest fraction.
     """
     preferred, likely, rest = attainable.rounds(values)
     sets = [one for annulus in annuli for one in annulus]
@@ -44,8 +44,8 @@ def smallest_proportions(
     good = attained(sets, preferred)
     proportions = np.array([mask.mean() for mask in good])
     smallest = np.ones(len(annuli))
-    # All values are tried at the position of each annulus with the smallest proportion so far; then, round by round,
-    # where less is attained than there. All annuli go together, so that no process waits for the end of one.
+    # Try all values at the position of each annulus with the smallest fraction so far; then, in rounds, at those where
+    # less is attained. All annuli go together, so that no process waits for the end of one.
     all_sets, rising = np.arange(len(sets)), np.argsort(proportions, kind="stable")
     only = rising[np.unique(owner[rising], return_index=True)[1]]
     for candidates, tried in ((only, likely), (only, rest), (all_sets, likely), (all_sets, rest)):
@@ -61,7 +61,7 @@ def smallest_proportions(
 
 
 def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
-    """Smallest proportions in an annulus, at five heights."""
+    """Smallest fractions in an annulus, at five heights."""
     cells: dict[Key, float | None] = {}
     divisions = DIVISIONS * choice.finer
     with Spread(workers) as spread:
@@ -84,7 +84,7 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
 
 
 def _annulus_positions(amplitude: str, depth: float) -> list[np.ndarray]:
-    # Return the positions of the annulus, one of each set that symmetries of the robot map onto each other.
+    # Return one position of the annulus for each set of positions that symmetries of the robot map onto each other.
     robot = checker_of(amplitude).problem.robot
     azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
     return [

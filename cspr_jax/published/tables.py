@@ -1,4 +1,4 @@
-"""Published tables beside the same cells computed. The published numbers are compared with, never computed with."""
+"""Published tables beside computed cells. Published numbers are only compared with, never computed with."""
 
 import contextlib
 import dataclasses
@@ -29,11 +29,11 @@ from cspr_jax.runtime.persistent_jit import checksum_of_sources
 from cspr_jax.runtime.stages import within
 
 SCHEMA = 1
-# As in plans and sweeps.
+# As for keys of plans and sweeps.
 LARGEST_ARCS, LARGEST_VALUES = 1000, 100
-# Files of the package that decide what it computes.
+# Endings of the package's files that decide what it computes.
 _SOURCES = (".py", ".toml", ".csv")
-LARGEST_RESULT = 1 << 24  # bytes, not compressed
+LARGEST_RESULT = 1 << 24  # bytes, before compression
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,15 +41,15 @@ class TableSource:
     """A table that can be recomputed.
 
     Fields:
-        title: of the table, with its source.
-        published: known cells as printed, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant; with a choice, from a `TableSettings` and a number of
-            processes.
-        with_choice: whether there is a choice of definitions, amplitude functions and step.
-        by_processes: whether several processes compute it where the user gives no number.
+        title: title of the table, with its source.
+        published: printed cells, by row, column and variant.
+        compute: () -> computed cells, by row, column and variant; if `with_choice`, its arguments are
+            a `TableSettings` and a number of processes.
+        with_choice: whether definitions, amplitude functions and step can be chosen.
+        by_processes: whether it uses several processes unless the user says how many.
         transposed: whether the source prints these rows as columns.
-        heads: names of rows and columns that mean something else in this source than in the others.
-        measures: whether it measures times, which no earlier run can have done.
+        heads: names of rows and columns that mean something else in this source than in other sources.
+        measures: whether it measures times, so that results of earlier runs are of no use.
     """
 
     title: str
@@ -81,7 +81,7 @@ _PUBLISHED_2_1 = {
     "6": ("0.5425", "6", "7.85"),
 }
 
-# In tables p is the number of arcs; the time that the S-model calls p has a name.
+# In most tables p is the number of arcs; here it is the S-model's time of acceleration.
 ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
     "1.1": TableSource(
@@ -175,9 +175,9 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 
 
 def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
-    """A result of the same sources, libraries and settings: that of an earlier run, else one that is kept from now.
+    """Result of an earlier run with the same sources, libraries and settings; if there is none, compute and keep it.
 
-    It lies beside compiled code, whose entries bear checksums: a damaged one is removed before it is read here.
+    It is kept beside compiled code, under a checksum: damaged results are removed before they are read.
     """
     folder = os.environ.get(PROGRAMS)
     if not folder:
@@ -194,7 +194,7 @@ def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: 
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     with contextlib.suppress(OSError):
         partial.write_bytes(zlib.compress(json.dumps([key, result]).encode()))
-        partial.replace(path)  # it may be a link to the entry of a former run
+        partial.replace(path)  # the path may be a link to an earlier run's result
     return result
 
 
@@ -209,14 +209,14 @@ def _plain(cell: Cell) -> dict[str, Any]:
 
 
 def _variant(text: str) -> dict[str, str]:
-    # "key = value; key = value", or a reading in words.
+    # Format "key = value; key = value"; other readings are plain words.
     if "; " not in text:
         return {"reading": text}
     return dict(part.split(" = ", 1) for part in text.split("; "))
 
 
 def table_for_people(name: str, cells: list[Cell], *, all_readings: bool = False) -> Any:
-    """The table for a terminal, as printed: published and computed in each cell, and why cells differ."""
+    """The table for a terminal, laid out as in print: published and computed values, and why they differ."""
     source = TABLES[name]
     return grid(
         source.title,

@@ -7,20 +7,20 @@ launch releases an object on a segment that passes the position of the release w
 requires. On more cables than degrees of freedom tensions are enclosed over time instead, and durations are searched for
 by samples.
 
-Source: the launch paper, section 3.1 (curve) and the sections after it (release and free flight).
-
+requires. With more cables than degrees of freedom, tensions are enclosed over time instead, and durations are searched
+for by samples.
 Files, each importing only from those above it:
 
     motion                positions over time, section 3.1
     margins               smallest pseudotensions and depth, exact
     limits                smallest slacks of limits, proved
     duration_roots        durations at which a verdict can change
-    redundant_verdicts    verdicts on more cables than degrees of freedom, by proofs of any motion
+    redundant_verdicts    verdicts with more cables than degrees of freedom, by the proof for any motion
     verdicts              verdicts of given durations
-    redundant_durations   intervals of durations, and the least, on more cables than degrees of freedom
-    durations             intervals of durations that keep every cable taut; the least under limits
+    redundant_durations   intervals of durations and the least one, with more cables than degrees of freedom
+    durations             intervals of durations that keep every cable taut; the least duration under limits
     sequences             least sum of the durations of a sequence
-    segments              answers for segments one after the other
-    launches              releases, and maps of what can be hit
+    segments              answers for consecutive segments
+    launches              releases, and maps of the points that an object can be thrown to
     leg                   Bezier segments in a plan
 """

@@ -1,9 +1,9 @@
 """Durations at which the verdict of a Bezier segment can change: roots of polynomials in r = (T / pi)^2.
 
 Multiplied by r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
-given or follows from an acceleration at the start, middle = start + r acceleration (15). Their smallest value on
-[-1, 1] can be zero only if the value at an end is, or if two roots in c meet: if the discriminant, of degree 8 in r at
-most, is zero.
+given or follows from an acceleration at the start, middle = start + r acceleration (15). The smallest value of a cubic
+on [-1, 1] can be zero only if its value at an end is zero, or if two roots in c coincide: then its discriminant, of
+degree 8 in r at most, is zero.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Ends(NamedTuple):
         start: (n, 3) from the centroid of the spools, z down, m.
         end: (n, 3) likewise.
         middle: (n, 3) second control point for r = 0, m.
-        middle_change: (n, 3) change of the second control point with r: 0, or the acceleration at the start, m/s^2.
+        middle_change: (n, 3) derivative of the second control point by r: 0, or the acceleration at the start, m/s^2.
     """
 
     start: np.ndarray
@@ -33,7 +33,7 @@ class Ends(NamedTuple):
     middle_change: np.ndarray
 
     def middles(self, durations: Float[np.ndarray, "n ..."]) -> Float[np.ndarray, "n ... 3"]:
-        """Second control points of given durations."""
+        """Second control points for given durations."""
         r = (np.asarray(durations) / np.pi) ** 2
         more = (slice(None), *[None] * (r.ndim - 1))
         return self.middle[more] + self.middle_change[more] * r[..., None]
@@ -46,8 +46,8 @@ def critical_durations(
     gravity: float,
     ends: Ends,
 ) -> list[np.ndarray]:
-    """Durations between which no cable tightens or falls slack, and no depth below the spools changes its sign."""
-    # In units in which r, and with it the coefficients, are about 1.
+    """Durations between which no cable becomes taut or slack, and no depth below the spools changes sign."""
+    # Use units in which r, and so the coefficients, are about 1.
     extent = np.abs(ends.end - ends.start).sum(1) + np.abs(ends.start).sum(1)
     unit = extent / gravity
     vectors = _vectors(ends, unit)
@@ -56,7 +56,7 @@ def critical_durations(
 
 
 def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
-    # Return the coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
+    # Return the coefficients A, B, C of (17), each (n, 3, 2), by powers of r in these units.
     constant = powers(ends.start, ends.middle, ends.end)
     nothing = np.zeros_like(ends.middle_change)
     change = powers(nothing, ends.middle_change * unit[:, None], nothing)
@@ -68,7 +68,7 @@ def _of_cables(
 ) -> list[np.ndarray]:
     # Return pseudotensions times r at both ends, and the discriminants of the cubics.
     square, linear, constant = vectors
-    # r g, z down.
+    # Weight per mass, r g, z down.
     weight = np.zeros((len(unit), 3, 2))
     weight[:, 2, 1] = gravity * unit
     first = total(2.0 * square, -weight)
@@ -112,7 +112,7 @@ def _discriminant(f: list[np.ndarray]) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    # (n, 3, d) of tables.
+    # Return cross products of vectors (n, 3, d) whose components are polynomials.
     pairs = [(1, 2), (2, 0), (0, 1)]
     return np.stack([product(a[:, i], b[:, j]) - product(a[:, j], b[:, i]) for i, j in pairs], axis=1)
 
@@ -122,7 +122,7 @@ def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 
 def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
-    # Roots that rounding has moved off the real axis count: durations between roots are tested anyway.
+    # Keep roots that rounding has moved off the real axis: durations between roots are tested anyway.
     roots = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
     near = np.abs(roots.imag) <= 1e-3 * np.abs(roots)
     return np.unique(roots.real[near & (roots.real > 0.0) & np.isfinite(roots)])

@@ -1,4 +1,4 @@
-"""Durations of Bezier segments that keep every cable taut, as intervals; and the least of them under limits."""
+"""Intervals of durations of Bezier segments that keep every cable taut, and the least duration under limits."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from cspr_jax.robots.statics.force_balance import adjugate
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts
 
-# Halvings of the interval between a duration that is feasible and one that is not: as many as float64 has digits.
+# Bisections between a feasible and an infeasible duration: as many as float64 has digits.
 HALVINGS = 60
-# Durations tried under limits in each interval that keeps every cable taut, in geometric progression up to so many
-# times the first.
+# Under limits, this many durations are tried in each interval that keeps every cable taut, in geometric progression,
+# up to this multiple of the shortest.
 TRIED, WIDEST = 129, 100.0
-# Longest duration over the time that the largest speed or acceleration of the cables takes for the distance.
+# The longest duration tried is this multiple of the time that the speed or acceleration limits need for the distance.
 AMPLE = 20.0
 
 
@@ -52,7 +52,7 @@ def proved_margins(
 
 
 def feasible_durations(robot: PointMassRobot, ends: Ends, z0: Float[np.ndarray, "n"]) -> list[np.ndarray | None]:
-    """Durations that keep every cable taut below the spools; on redundant cables, wherever they are."""
+    """Durations that keep every cable taut below the spools; with redundant cables, at any depth."""
     if robot.n_cables > robot.dof:
         from cspr_jax.families.beziers.redundant_durations import taut_durations
 
@@ -76,7 +76,7 @@ def feasible_durations(robot: PointMassRobot, ends: Ends, z0: Float[np.ndarray, 
 
 
 def _between(roots: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    # Choose one duration below all roots of a segment, one between any two, one above all; number the segment of each.
+    # For each segment, choose one duration below all roots, one between neighbouring roots, and one above all.
     tests = []
     for critical in roots:
         times = critical if len(critical) else np.array([1.0])
@@ -85,7 +85,7 @@ def _between(roots: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _intervals(is_in_segment: np.ndarray, is_good: np.ndarray, changes: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    # Each change is one end of an interval; the last test of a segment says whether it is open.
+    # Each change is an end of an interval; the last test of a segment says whether its last interval is unbounded.
     indices = np.flatnonzero(is_in_segment)
     inside = [float(edge) for change, edge in zip(changes, edges, strict=True) if is_in_segment[change]]
     starts = [0.0] if is_good[indices[0]] else []
@@ -98,8 +98,8 @@ def least_duration(
 ) -> float:
     """Least feasible duration of one segment.
 
-    Without limits it is the first one that keeps every cable taut. With limits, the first of many durations that meets
-    them is narrowed down; a shorter one between two of them is not excluded.
+    Without limits it is the shortest that keeps every cable taut. With limits, the first feasible one of many trial
+    durations is narrowed down; a shorter one between two trials is not excluded.
     """
     if intervals is not None and len(intervals) and not limits_set(problem.limits):
         return float(intervals[0, 0])
@@ -120,7 +120,7 @@ def least_duration(
         good = np.flatnonzero(verdicts_of(times, allowed).verdict == 0)
         if len(good):
             return _narrowed(partial(verdicts_of, allowed=allowed), times, int(good[0]))
-    # Nothing is feasible: return the duration that comes nearest.
+    # Nothing is feasible: return the duration that comes nearest to it.
     extent = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
     unit = np.sqrt(max(extent, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])

@@ -1,4 +1,4 @@
-"""Leg of Bezier segments, at rest in every pose; an object may be released on one of them."""
+"""Leg of Bezier segments, at rest at every pose; an object may be released on one of them."""
 
 import dataclasses
 from typing import NamedTuple, cast
@@ -24,14 +24,14 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.robots.model.point_mass import AT_P0, spool_radius
 
-# Accelerations that count as none, over gravity.
+# Accelerations up to this fraction of gravity count as zero.
 AT_REST = 1e-9
 # A duration within this factor of the shortest one that the search tries counts as that one.
 ABOVE_SHORTEST = 1.0 + 1e-6
 
 
 class _Chosen(NamedTuple):
-    # Positions, durations (None: the least, one after the other) and first control point; the release, if there is one.
+    # Positions, durations (None: each the least, in order) and the first control point; the release, if there is one.
     points: np.ndarray
     durations: list[float | None]
     first: np.ndarray
@@ -43,19 +43,19 @@ class Beziers(Leg):
     """Any positions, joined by Bezier segments; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
-        """Refuse numbers of arcs, of which a segment has none."""
+        """Refuse numbers of arcs, which Bezier segments do not have."""
         super().__init__(waypoints)
         self._refuse("arcs")
         if waypoints.plan_file.least == "total" and None not in self._durations:
             raise ConfigError(waypoints.path, 'least = "total": must be absent where every duration is given')
         launch = waypoints.plan_file.launch
-        # Number of the segment of the launch, if it is one of these.
+        # Index of the launching segment, if it is in this leg.
         self._at = None if launch is None or not 0 <= launch.segment - waypoints.first < len(self) else launch.segment
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the positions; see `Leg.join`."""
         points, frame = self._points(problem, z0), self.waypoints.frame
-        # The depth is that of P0, else that of the first pose.
+        # Normalise by the depth of P0, else by that of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
         chosen = self._chosen(problem, points, depth)
         segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
@@ -112,7 +112,7 @@ class Beziers(Leg):
 
     def _points(self, problem: Problem, z0: float) -> np.ndarray:
         points, waypoints = self.waypoints.points(z0), self.waypoints
-        if self._at is not None:  # where it follows from the launch
+        if self._at is not None:  # the launch determines it
             points[self._at - waypoints.first + 1] = np.nan
         near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
         for i in (np.flatnonzero(near) + 1).tolist():
@@ -127,7 +127,7 @@ class Beziers(Leg):
         return points
 
     def _refuse_unbounded(self, problem: Problem, times: np.ndarray, points: np.ndarray) -> None:
-        # Redundant cables without largest tensions may give any acceleration, so that no duration is the least.
+        # Redundant cables without largest tensions may give any acceleration, so there is no least duration.
         if problem.robot.n_cables == problem.robot.dof:
             return
         is_searched = self.waypoints.plan_file.least == "total" or self._at is not None
@@ -142,7 +142,7 @@ class Beziers(Leg):
             )
 
     def _check_rests(self, problem: Problem, motions, first: np.ndarray) -> None:
-        # A pose at rest has no acceleration.
+        # A pose that stays at rest has no acceleration.
         times = np.asarray(motions.time)[:, None]
         ends = end_acceleration(motions.middle, motions.end, times)
         starts = (np.pi / times[:1]) ** 2 * first[None]
@@ -158,7 +158,7 @@ class Beziers(Leg):
 
 
 def _question(waypoints: Waypoints, table: LaunchTable, points: np.ndarray, depth: float, gravity: float) -> Launch:
-    # Requirements of the [launch] table; `depth` is that at which slacks are normalised.
+    # Return the requirements of the [launch] table; `depth` is the one at which slacks are normalised.
     parabola = parabola_of(table, waypoints.frame, gravity, waypoints.path)
     duration = waypoints.poses[table.segment - waypoints.first + 1].duration
     if table.release is not None and isinstance(duration, float) and not table.release < duration:

@@ -1,8 +1,8 @@
-"""Smallest slacks of limits along Bezier segments, with a proof.
+"""Proved lower bounds of the smallest slacks of limits along Bezier segments.
 
-In c = cos(pi tau) every quantity that a limit bounds is made of polynomials: squares of cable lengths, of their rates
-times the lengths, pseudotensions, the depth. Over a block of c each of them, and its derivatives, has bounds by its
-Bernstein coefficients; interval jets carry these to the slacks.
+In c = cos(pi tau) every limited quantity is made of polynomials: squares of cable lengths, lengths times their rates,
+pseudotensions, the depth. Over a block of c, Bernstein coefficients bound each polynomial and its derivatives; interval
+jets carry these bounds to the slacks.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.statics.force_balance import adjugate
 
 Items = dict[str, Any]
-# Blocks that are computed together.
+# Number of blocks computed at a time.
 TOGETHER = 1 << 14
 
 
 def limit_slacks(
     problem: Problem, motions: Bezier, kappa: Float[np.ndarray, "n n_cables 4"], is_below: Bool[np.ndarray, "n"]
 ) -> Proved:
-    """Smallest slacks of the limits that are given, in their order."""
+    """Smallest slacks of the limits that are set, in their order."""
     limits, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
     slacks = [_SLACKS[limit.name](problem, getattr(problem.limits, limit.name)) for limit in limits]
     count = len(is_below)
@@ -62,7 +62,7 @@ def _of_limit(slack: Callable[[Items], Any], ends: list[Items], during: Items) -
 
 
 def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> dict[str, np.ndarray]:
-    # Return coefficients by powers of c: (n, n_cables, d) or (n, 1, d).
+    # Return coefficients of the powers of c, (n, n_cables, d) or (n, 1, d).
     a = np.asarray(problem.robot.base_points)
     square, linear, constant = powers(motions.start, motions.middle, motions.end)
     u = ((np.pi / motions.time) ** 2)[:, None, None]
@@ -137,7 +137,7 @@ def _of_mass_centre(problem: Problem, limit, quantity: str) -> Callable[[Items],
     return lambda at: at[quantity] * (-1.0 / float(limit) ** 2) + 1.0
 
 
-# By the names of the limits.
+# Slacks by the name of their limit.
 _SLACKS: dict[str, Callable[[Problem, Any], Callable[[Items], Any]]] = {
     "tension_min": partial(_tension, sense=1.0),
     "tension_max": partial(_tension, sense=-1.0),

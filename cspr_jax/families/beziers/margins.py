@@ -1,9 +1,9 @@
-"""Smallest pseudotensions and depth along Bezier segments, exact: nothing is sampled.
+"""Smallest pseudotensions and depth along Bezier segments by formulas: nothing is sampled.
 
 Pseudotensions are (rows + p x arms) (p'' - g), bilinear in p and p'' - g, both of which are quadratic in c, the cosine
-of pi tau. The fourth power cancels, since its factors are parallel: what is left is a cubic in c for every triangle of
-spools (19), whose smallest value on [-1, 1] is at an end or where its derivative is zero. The depth below the spools is
-a quadratic. All this holds for a point mass on two cables in a plane likewise.
+of pi tau. The fourth power cancels, since its factors are parallel. So each triangle of spools has a cubic in c (19),
+whose smallest value on [-1, 1] is at an end or where its derivative is zero. The depth below the spools is a quadratic.
+The same holds for a point mass on two cables in a plane.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, rest_point, spool_radius
 from cspr_jax.robots.statics.force_balance import adjugate, pseudotensions
 
-# Rounding errors are below so many units of the sum of the magnitudes of all terms.
+# Rounding errors are below this many units in the last place of the sum of the magnitudes of all terms.
 EPSILONS = 64.0
 
 
@@ -31,7 +31,7 @@ class Margins(NamedTuple):
         taut: (n_cables,) smallest pseudotension over its value at rest in P0.
         below: () smallest depth below the spools over z0.
         taut_rounding: (n_cables,) bound of the rounding error of `taut`.
-        below_rounding: () likewise of `below`.
+        below_rounding: () bound of the rounding error of `below`.
     """
 
     taut: Array
@@ -42,7 +42,7 @@ class Margins(NamedTuple):
 
 @jax.jit
 def cubics(robot: PointMassRobot, motion: Bezier) -> Float[Array, "n_cables 4"]:
-    """Pseudotensions over their value at rest in P0, by powers of c = cos(pi tau), (19) and (20)."""
+    """Pseudotensions over their value at rest in P0, as coefficients of powers of c = cos(pi tau), (19) and (20)."""
     rows, arms = adjugate(robot)
     square, linear, constant = powers(motion.start, motion.middle, motion.end)
     u = (np.pi / motion.time) ** 2
@@ -62,14 +62,14 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Float[Array, "n_cables 4"]:
 
 @jax.jit
 def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Float[Array, "3"]:
-    """Depth below the spools over z0, by powers of c = cos(pi tau)."""
+    """Depth below the spools over z0, as coefficients of powers of c = cos(pi tau)."""
     square, linear, constant = powers(motion.start, motion.middle, motion.end)
     return jnp.stack([constant, linear, square]) @ plane_normal(robot) / motion.z0
 
 
 @jax.jit
 def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
-    """Smallest pseudotensions and depth of a segment: (22) to (25), with the minimum in (25) in place of "max"."""
+    """Smallest pseudotensions and depth of a segment: (22) to (25), with a minimum in (25) instead of "max"."""
     rows, arms = adjugate(robot)
     square, linear, constant = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
     position = square + linear + constant
@@ -85,7 +85,7 @@ def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
 
 
 def depths_of(robot: PointMassRobot, starts: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-    """Depths by which slacks are normalised where there is no P0: those of the starts."""
+    """Depths at which slacks are normalised where there is no P0: those of the starts."""
     depth = starts @ np.asarray(plane_normal(robot))
     return np.where(depth > 0.0, depth, float(spool_radius(robot)))
 
@@ -93,8 +93,7 @@ def depths_of(robot: PointMassRobot, starts: Float[np.ndarray, "n 3"]) -> Float[
 def smallest_cubic(powers_of_c: Float[Array, "4 ..."]) -> Float[Array, "..."]:
     """Smallest value of cubics on [-1, 1].
 
-    The zeros of the derivative are found without cancellation; where one is not in the interval, an end stands in for
-    it.
+    The zeros of the derivative are found without cancellation; a zero outside the interval is replaced by an end.
     """
     f0, f1, f2, f3 = powers_of_c
     discriminant = f2**2 - 3.0 * f3 * f1
@@ -114,7 +113,7 @@ def smallest_quadratic(powers_of_c: Float[Array, "3 ..."]) -> Float[Array, "..."
 
 
 def _inside(c: Array) -> Array:
-    # Derivatives of a smallest value do not depend on how its argument moves: there the derivative is zero.
+    # Keep the argument of the minimum constant: it does not affect derivatives, since the derivative there is zero.
     return lax.stop_gradient(jnp.clip(jnp.where(c * 0.0 == 0.0, c, 1.0), -1.0, 1.0))
 
 

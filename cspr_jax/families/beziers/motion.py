@@ -1,8 +1,8 @@
 """Bezier curves of the second order, traversed by half a period of a cosine (launch paper, section 3.1).
 
-With c = cos(pi tau), from 1 to -1, the position is A c^2 + B c + C, (17), and with w = pi / T the acceleration
-w^2 (2 A - B c - 4 A c^2), (18). At the start it is w^2 (middle - start), at the end w^2 (middle - end): where two
-segments meet, both are the same (15).
+With c = cos(pi tau), which goes from 1 to -1, the position is A c^2 + B c + C, (17); with w = pi / T the acceleration
+is w^2 (2 A - B c - 4 A c^2), (18). It is w^2 (middle - start) at the start and w^2 (middle - end) at the end; where two
+segments meet, both are equal (15).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import normalised
 
-# Blocks of which bounds are computed at a time.
+# Number of blocks whose bounds are computed at a time.
 BATCH = 64
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Bezier:
-    """Motion along a Bezier curve of the second order; see `Motion`. Numbers of jax, or of NumPy for many at a time.
+    """Motion along a Bezier curve of the second order; see `Motion`. Fields are jax numbers, or NumPy arrays of many.
 
     Fields:
         start: (3,) first control point, from the centroid of the spools, z down, m.
@@ -62,7 +62,7 @@ class Bezier:
         return State(square * c**2 + linear * c + rest, velocity, acceleration)
 
     def breaks(self) -> Array:
-        """No breaks; see `Motion.breaks`."""
+        """Return no breaks; see `Motion.breaks`."""
         return jnp.zeros(0)
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
@@ -73,7 +73,7 @@ class Bezier:
 def many_bounds(
     curves: Bezier, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
 ) -> StateBounds:
-    """Bounds of the states of several segments over blocks of time."""
+    """Bounds of the states of a batch of segments over blocks of time."""
     each = jax.tree.map(lambda x: x[motion], curves)
     return in_batches(_bounds, (each, normalised(each.time, start, end)), batch_size=BATCH)
 
@@ -81,7 +81,7 @@ def many_bounds(
 @persistent_jit
 def _bounds(blocks: tuple[Bezier, AffineBounds]) -> StateBounds:
     def one(curve: Bezier, tau: AffineBounds) -> StateBounds:
-        # 2 c^2 is 1 + cos(2 pi tau), 2 c sin(pi tau) is sin(2 pi tau).
+        # 2 c^2 = 1 + cos(2 pi tau), and 2 c sin(pi tau) = sin(2 pi tau).
         (sine, c), (sine2, c2) = sincospi(tau), sincospi(tau * 2.0)
         square, linear, rest = powers(curve.start, curve.middle, curve.end)
         w = np.pi / curve.time
@@ -100,5 +100,5 @@ def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:
 
 
 def end_acceleration(middle: Any, end: Any, duration: Any) -> Any:
-    """Acceleration at the end of a segment, with which the next one starts: (8), (15)."""
+    """Acceleration at the end of a segment, which is that at the start of the next: (8), (15)."""
     return (np.pi / duration) ** 2 * (middle - end)

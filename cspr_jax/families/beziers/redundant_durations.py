@@ -1,10 +1,10 @@
-"""Durations of Bezier segments on more cables than degrees of freedom: searched for by samples, decided by proofs.
+"""Durations of Bezier segments with more cables than degrees of freedom: found by samples, then proved.
 
-Where the control points do not depend on the duration, what the cables must supply at each point is affine in
-u = (pi / T)^2. Tensions within limits for two values of u can be interpolated to tensions for those between them, and
-speeds and accelerations of cables fall as T grows: the feasible durations are one interval, and between two that are
-proved all are. Where the second control point follows from the acceleration at the start, (15), the curve changes with
-T, and only the durations that are tried are decided.
+Where the control points do not depend on the duration, the force that the cables must supply at each point is affine in
+u = (pi / T)^2. Tensions within limits for two values of u can be interpolated for those between, and speeds and
+accelerations of cables fall as T grows. So the feasible durations are one interval: all durations between two proved
+ones are feasible. Where the second control point follows from the acceleration at the start, (15), the curve changes
+with T, and only the durations tried are decided.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH, SAMPLES = 512, 65
-# Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far
-# as the distance.
+# Number of durations tried first, and the shortest and longest, over the time of a fall by the distance; they are in
+# geometric progression.
 TRIED, SHORTEST, LONGEST = 257, 1e-2, 100.0
 FINER = 33  # durations of a finer search between the neighbours of the best one
-ROUNDS = 4  # of finer searches, at most
-# Fraction of a duration to which ends of intervals are narrowed.
+ROUNDS = 4  # largest number of finer searches
+# Ends of intervals are bisected to this fraction of a duration.
 CLOSE = 1e-9
 
 
@@ -45,7 +45,7 @@ def _sampled(problem: Problem, motions: Bezier) -> jax.Array:
 
 
 class _Segment:
-    # A segment of which durations are tried.
+    # A segment with various durations.
 
     def __init__(self, problem: Problem, ends: Ends, z0: float) -> None:
         self._problem, self._ends, self._z0 = problem, ends, z0
@@ -65,7 +65,7 @@ class _Segment:
         return proof.verdict == Verdict.FEASIBLE
 
     def edge(self, good: float, bad: float) -> float:
-        # Return the duration that is proved next to one that is not.
+        # Bisect between a proved duration and one that is not; return the last proved one.
         while abs(bad - good) > CLOSE * good:
             middle = 0.5 * (good + bad)
             good, bad = (middle, bad) if self.is_proved(middle) else (good, middle)
@@ -73,7 +73,7 @@ class _Segment:
 
 
 def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> Float[np.ndarray, "1 2"] | None:
-    """Durations that keep every cable taut."""
+    """Durations that keep every cable taut; None if they may not be one interval."""
     if ends.middle_change.any():
         return None
     segment = _Segment(Problem(robot, NO_LIMITS, named("quintic")), ends, z0)
@@ -100,7 +100,7 @@ def least_proved_duration(problem: Problem, ends: Ends, z0: float, slowest: floa
 def _sampled_durations(
     segment: _Segment, robot: PointMassRobot, ends: Ends, slowest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return durations and their smallest sampled slacks: the finer ones where none of the coarse ones is above zero.
+    # Return durations and their smallest sampled slacks; where no coarse slack is positive, refine about the best one.
     radius, gravity = float(spool_radius(robot)), float(robot.gravity)
     distance = max(
         float(np.linalg.norm(ends.end - ends.start) + np.linalg.norm(ends.middle - ends.start)), 1e-9 * radius

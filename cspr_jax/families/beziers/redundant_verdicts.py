@@ -1,8 +1,8 @@
-"""Verdicts of Bezier segments on more cables than degrees of freedom: proofs of any motion, and samples for searches.
+"""Verdicts of Bezier segments with more cables than degrees of freedom: general proofs, and samples for searches.
 
-The motion determines no pseudotensions there. Tensions that balance it are enclosed over blocks of time instead
-(`verification.time_proof`); the margin is the largest distance that all tensions can keep from their limits, in
-newtons.
+Redundant cables have no pseudotensions that the motion determines. Instead, tensions that balance it are enclosed over
+blocks of time (`verification.time_proof`); the margin is the largest distance that all tensions can keep from their
+limits, in newtons.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of
 from cspr_jax.verification.proved_verdicts import Verdicts
 
-TOGETHER = 64  # segments that are proved at a time
-# Larger margins, over weight / n_cables, count as this one in searches: without largest tensions they have no bound.
+TOGETHER = 64  # number of segments proved at a time
+# Searches cap margins over weight / n_cables at this value: without largest tensions margins are unbounded.
 LARGEST = 1e6
 LIMIT_FLAGS = [row.flag for row in LIMITS if row.quantity != "tension"]
 
@@ -63,14 +63,14 @@ def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, Fl
 
 
 def _limit_slack(proof: MotionProof, z0: float) -> float:
-    # Smallest slack of the limits beside those of tensions, over their values, of the floor over z0.
+    # Return the smallest relative slack of all limits but those of tensions; the floor is relative to z0.
     slacks = zip(proof.criteria, proof.proof.high.tolist(), strict=True)
     each = (slack / (row.allowed if row.cables else z0) for row, slack in slacks if row.flag in LIMIT_FLAGS)
     return min(each, default=np.inf)
 
 
 def slacks_at(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
-    """Slacks at one time, for searches."""
+    """Slacks at one normalised time, for searches."""
     robot, state = problem.robot, motion.state(tau)
     matrix, wrench = robot.wrench_matrix(state), robot.inertial_wrench(state)
     margin = centred(matrix, wrench, *tension_range(robot, problem.limits))[1]

@@ -1,4 +1,4 @@
-"""Bezier segments, one after the other: durations that are given or the least, accelerations that go on, verdicts."""
+"""Consecutive Bezier segments with continuous accelerations: given or least durations, and verdicts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from cspr_jax.numerics.shapes import Float
 
 @dataclasses.dataclass(frozen=True)
 class BezierAnswers(Answers):
-    """Answers of Bezier segments, one each.
+    """Answers of Bezier segments.
 
     Fields:
-        control_points: (n, 3, 3) start, middle and end; m.
-        taut_durations: (n,) for each segment, the durations that keep every cable taut, with the segments before it
-            unchanged: [[least, largest], ...] in s, inf where any longer duration does; None where they are not known.
-        release: (n,) time of the release of an object, after the start of the segment, s; NaN without a release.
-        flight_time: (n,) time of the flight of the object, s; NaN likewise.
+        control_points: (n, 3, 3) start, middle and end of each, m.
+        taut_durations: (n,) for each segment, the durations that keep every cable taut while earlier segments stay
+            unchanged: [[least, largest], ...] in s, inf if there is no largest; None if they are not computed.
+        release: (n,) time of release of an object since the start of the segment, s; NaN without a release.
+        flight_time: (n,) time of flight of the object, s; NaN without a release.
     """
 
     control_points: np.ndarray
@@ -47,11 +47,11 @@ class BezierAnswers(Answers):
 
 
 class Joined(NamedTuple):
-    """Segments, each with the intervals from which its duration was chosen.
+    """Segments, with the intervals from which their durations were chosen.
 
     Fields:
-        motions: NumPy leaves with a leading dimension n.
-        taut_durations: (n_intervals, 2) s of each; see `BezierAnswers`.
+        motions: the n segments, as NumPy leaves with a leading dimension n.
+        taut_durations: for each segment, (n_intervals, 2) s; see `BezierAnswers`.
     """
 
     motions: Bezier
@@ -65,9 +65,9 @@ def joined_segments(
     first_control_point: Float[np.ndarray, "3"],
     z0: float,
 ) -> Joined:
-    """Segments through points, at rest in each, with accelerations that go on from one to the next (15)."""
+    """Segments through points, at rest at each, whose accelerations are continuous (15)."""
     motions, intervals, depth = [], [], np.array([z0])
-    # The first segment is given its control point, each of the next ones the acceleration at its start.
+    # The first segment is given its control point, all others the acceleration at their start.
     ends = Ends(points[:1], points[1:2], first_control_point[None], np.zeros((1, 3)))
     for i, duration in enumerate(durations):
         taut_durations = feasible_durations(problem.robot, ends, depth)[0]

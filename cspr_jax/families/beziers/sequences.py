@@ -1,7 +1,7 @@
-"""Durations of a sequence of Bezier segments whose sum is least; accelerations that go on couple them all.
+"""Sequences of Bezier segments of least total duration; continuous accelerations couple all durations.
 
-At the ends of segments the accelerations are affine in u = (pi / T)^2: each segment adds u (start - end) to the one
-before it, (15).
+Accelerations at the ends of segments are affine in u = (pi / T)^2: each segment adds u (start - end) to the
+acceleration at its start, (15).
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from cspr_jax.numerics.search.constrained_minima import Verified, constrained_mi
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import spool_radius
 
-# Shortest and longest duration that is tried, over that of a fall by the robot's radius.
+# Shortest and longest duration tried, over the time of a fall by the robot's radius.
 SHORTEST, LONGEST = 0.1, 40.0
-# Samples of a segment at which limits are kept; they are proved afterwards.
+# Number of samples of a segment at which the search keeps limits; they are proved afterwards.
 SAMPLES = 65
 
 
 class Anchored(NamedTuple):
-    """Sequence of segments, one of whose second control points is given; numbers of NumPy or of jax.
+    """Sequence of segments, one of which has a given second control point; numbers of NumPy or of jax.
 
     Fields:
         points: (n + 1, 3) from the centroid of the spools, z down, m.
-        segment: () number of the segment whose control point is given.
-        control_point: (3,) m.
+        segment: () index of the segment whose control point is given.
+        control_point: (3,) its second control point, m.
         z0: () depth at which slacks are normalised, m.
     """
 
@@ -60,7 +60,7 @@ def segments_of(sequence: Anchored, durations: Float[Array, "n"]) -> Bezier:
 
 
 def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Array:
-    """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
+    """Margins of segments for a search: exact for taut cables and the depth, sampled for limits.
 
     On redundant cables those of tensions are sampled, too.
     """
@@ -83,14 +83,14 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
 
 
 def verified(problem: Problem, segments: Bezier) -> Verified:
-    """Verify a sequence: is it proved feasible, and what is its smallest slack?"""
+    """Verify a sequence: return whether it is proved feasible, and its smallest slack."""
     results = verdicts(problem, jax.tree.map(np.asarray, segments))
     worst = smallest_slacks(problem, results).min()
     return Verified(bool((results.verdict == 0).all()), float(worst))
 
 
 def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:
-    """Logarithms of the shortest and of the longest duration that searches try."""
+    """Logarithms of the shortest and the longest duration that searches try."""
     unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
     longest = max(LONGEST * unit, slowest(problem, points))
     return float(np.log(SHORTEST * unit)), float(np.log(longest))
@@ -103,7 +103,7 @@ def _parts(arguments, x: Array) -> tuple[Array, Array]:
 
 
 def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> Float[np.ndarray, "n"]:
-    """Durations whose sum is least."""
+    """Durations with the least sum."""
     initial = np.array([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None])
 

@@ -20,7 +20,7 @@ from cspr_jax.robots.statics.force_balance import pseudotensions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack, with_touched
 
-# Segments computed together: of a plan, and of arrays.
+# Number of segments computed at a time: for a plan, and for arrays.
 BATCH, MANY = 256, 8192
 
 
@@ -52,7 +52,7 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
 
 
 def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
-    """Verdicts, on as many cables as degrees of freedom, of which none that touches a limit is feasible."""
+    """Verdicts with as many cables as degrees of freedom; motions that touch a limit are not feasible."""
     batch = BATCH if len(motions.time) <= BATCH else MANY
     margins = in_batches(partial(_margins, problem.robot), motions, batch_size=batch)
     slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
@@ -83,10 +83,10 @@ def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
 
 
 def smallest_slacks(problem: Problem, results: Verdicts) -> Float[np.ndarray, "n"]:
-    """Smallest slack of each segment, of tensions and limits, without a unit."""
+    """Smallest slack of each segment, of tensions and limits, dimensionless."""
     robot, margin = problem.robot, results.margin
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
-    # Above the spools the margin of limits of tensions is not known, and the depth decides.
+    # Above the spools limits of tensions have no margin, and the depth decides.
     minimum = np.where(np.isneginf(results.limit_margin), margin, np.minimum(margin, results.limit_margin))
     return np.where(np.isnan(minimum), -np.inf, minimum)

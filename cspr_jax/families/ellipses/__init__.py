@@ -2,16 +2,15 @@
 
 A point mass that moves as x = C + a cos(wt) + b sin(wt) has pseudotensions of one harmonic each, so that verdict,
 margin and the interval of feasible frequencies are formulas; at the natural frequency every ellipse below the spools is
-feasible whose centre lies below their hull. Rest is an ellipse without axes: from rest, to rest and from one ellipse to
-another, centre, axes, frequency and orientation change along an amplitude function, in the smallest number of arcs that
-is proved.
+feasible whose centre lies below their hull. Rest is an ellipse without axes. On a transfer between ellipses, centre,
+axes, frequency and orientation change along an amplitude function, in the smallest number of arcs that is proved.
 
 Source: Gosselin, Ren, Foucault (ICRA 2012); Mottola, Gosselin, Carricato (J. Mechanisms and Robotics 10, 2018, 031004);
-derived for any coplanar spools, centre and plane in docs/theory.md.
+docs/theory.md derives the formulas for any coplanar spools, centre and plane.
 
 Files, each importing only from those above it:
 
-    hull                   hull of the spools by affine functions
+    hull                   hull of the spools, described by affine functions
     harmonics              margins and frequencies by formulas
     rotation               orientations of platforms
     motion                 motion on ellipses and between them
@@ -22,6 +21,6 @@ Files, each importing only from those above it:
     leg                    ellipses in a plan
     cells                  proofs and answers of turns on many ellipses
     map                    maps of feasible frequencies and margins
-    swing_range            least speeds of throws from ellipses
-    swing_range_map        maps of these
+    swing_range            slowest throws from ellipses
+    swing_range_map        maps of slowest throws
 """

@@ -1,4 +1,4 @@
-"""Answers of turns on many ellipses: frequencies and margins by formulas, limits by the proof for any motion."""
+"""Turns on many ellipses: frequencies and margins by formulas, limits by the proof for any motion."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of
 
-# Rounding error of a margin over the largest number in it, with a reserve.
+# Bound of the rounding error of a margin, over the largest number in its formula.
 MARGIN_ERROR = 256.0 * float(np.finfo(float).eps)
-BATCH = 64  # blocks of which bounds are computed at a time
-TOGETHER = 1024  # turns that are proved at once
+BATCH = 64  # number of blocks whose bounds are computed at a time
+TOGETHER = 1024  # number of turns proved at a time
 # An angle just above a full turn, so that rounding leaves no part of the turn out.
 TURN = math.nextafter(2.0 * math.pi, 7.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class EllipseCells(Columns):
-    """Turns on n ellipses; rows of `schema.quantities` say what each field is.
+    """Turns on n ellipses; rows of `schema.quantities` describe each field.
 
     Fields:
         verdict: (n,) flags of `Verdict` at `used_frequency`.
-        margin: (n,) smallest normalised pseudotension or depth there; NaN where no formula holds.
+        margin: (n,) smallest normalised pseudotension or depth at `used_frequency`; NaN where no formula holds.
         used_frequency: (n,) rad/s.
         lowest_frequency: (n,) rad/s.
         highest_frequency: (n,) rad/s.
         natural_frequency: (n,) rad/s.
-        binding_cable: (n,) words of `schema.meanings.slack_cables`.
-        duration: (n,) of a turn, s.
-        tension_margin: (n,) N; NaN where nothing is proved by bounds.
-        limit_margin: (n,) of other limits, likewise.
+        binding_cable: (n,) names of `schema.meanings.slack_cables`.
+        duration: (n,) duration of a turn, s.
+        tension_margin: (n,) N; NaN where no proof bounds it.
+        limit_margin: (n,) margin of other limits; NaN likewise.
     """
 
     verdict: np.ndarray
@@ -63,7 +63,7 @@ class EllipseCells(Columns):
 
 
 def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.ndarray, "n"] | str) -> EllipseCells:
-    """Answers of turns on ellipses."""
+    """Answers of one turn on each ellipse."""
     robot, count = problem.robot, len(ellipses.centre)
     depth = np.asarray(ellipses.centre) @ np.asarray(plane_normal(robot))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -82,7 +82,7 @@ def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.nda
         verdict = np.where(has_frequency, FLAGS(Verdict.UNDECIDED.value), FLAGS(Verdict.NOT_FINITE.value))
         margin, binding = nothing, np.zeros(count, int)
     else:
-        # Any frequency tells what is in the way where none is feasible.
+        # Where no frequency is feasible, any frequency shows what fails: take the natural one.
         margins, rounding = _margins(hull, robot, ellipses, np.where(has_frequency, used, np.nan_to_num(natural)))
         verdict = _verdict(robot, margins, rounding)
         margin = np.where(has_frequency, margins.min(1), np.nan)
@@ -102,7 +102,7 @@ def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.nda
 def _margins(
     hull: SpoolHull, robot: PointMassRobot, ellipses: Ellipse, frequencies: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest values of the edges and of the depth, (n, n_edges + 1), and their rounding errors, (n, 1).
+    # Return the smallest values of the edges and of the depth, (n, n_edges + 1), and their rounding errors, (n, 1).
     margins = harmonics.of_many(harmonics.harmonic_margins, hull, ellipses, frequencies)
     centre, a, b = (np.linalg.norm(array, axis=1) for array in ellipses)
     normal = np.asarray(hull.normal)
@@ -127,7 +127,7 @@ def _verdict(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -
 
 
 def _binding(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    # Among equals, as of symmetric robots, the first cable.
+    # Among equals, as on symmetric robots, take the first cable.
     first = np.argmax(margins <= margins.min(1, keepdims=True) + rounding, axis=1)
     if robot.n_cables == robot.dof:
         return first + 1
@@ -139,11 +139,11 @@ def _binding(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -
 
 @dataclasses.dataclass(frozen=True)
 class Turns:
-    """One turn on each of n ellipses, with its angle as the time, so that slower and slower turns have a limit.
+    """One turn on each of n ellipses; time is the angle, so that slow turns have a limit.
 
     Fields:
-        ellipses: leaves (n, 3).
-        frequencies: (n,) rad/s; 0: the limit of slow turns.
+        ellipses: the n ellipses, leaves (n, 3).
+        frequencies: (n,) rad/s; 0 is the limit of slow turns.
     """
 
     ellipses: Ellipse
@@ -152,7 +152,7 @@ class Turns:
     def bounds(
         self, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
     ) -> StateBounds:
-        """Bounds of the states over blocks."""
+        """Bounds of the states over blocks of angles."""
         chosen = Ellipse(*(np.asarray(array)[motion] for array in self.ellipses))
         return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), batch_size=BATCH)
 

@@ -1,7 +1,7 @@
-"""Frequencies that a plan leaves open: natural, the best, the fastest and the slowest within all limits.
+"""Frequencies that a plan leaves open: natural, best, fastest and slowest within all limits.
 
-What cables alone allow is a formula (`harmonics`). Limits, spools in several planes, pulleys and obstacles are asked by
-samples of one turn; a verdict is the proof of the motion that results.
+Formulas give the frequencies that keep cables taut (`harmonics`). Limits, spools in several planes, pulleys and
+obstacles are checked at samples of one turn; the verdict comes from the proof of the resulting motion.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.criteria import criteria
 
-ANGLES = 128  # samples of a turn where there are many frequencies
-FINE = 4096  # for one frequency alone
-GRID = 65  # frequencies
-HALVINGS = 40  # that follow
-INSIDE = 1e-5  # distance that is kept from an end of the feasible frequencies, over the frequency
-# Factors of the natural frequency between which a frequency is sought where no formula bounds it.
+ANGLES = 128  # samples of a turn for each of many frequencies
+FINE = 4096  # samples of a turn for a single frequency
+GRID = 65  # number of frequencies tried first
+HALVINGS = 40  # bisections after the grid
+INSIDE = 1e-5  # relative distance from the ends of the feasible frequencies
+# Where no formula bounds it, a frequency is searched for from 1 / WIDEST to WIDEST times the natural one.
 WIDEST = 100.0
 SLOWER = "a number: the slower this ellipse, the larger the margin"
 
@@ -42,7 +42,7 @@ SLOWER = "a number: the slower this ellipse, the larger the margin"
 def chosen_frequency(
     problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None, rotation: Rotation | None = None
 ) -> float:
-    """Frequency by a rule."""
+    """Frequency that a rule chooses."""
     natural, hull = natural_frequency(problem, ellipse, rule), formula_hull(problem.robot)
     if rule == "natural":
         return natural
@@ -73,14 +73,14 @@ def chosen_frequency(
 
 
 def searched_frequency(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
-    """Frequency by a rule, from slacks of frequencies."""
+    """Frequency that a rule chooses by the slacks of many frequencies."""
     if rule == "best":
         return _largest(slack, low, high, natural)
     return _outermost(slack, low, high, natural, rule)
 
 
 def natural_frequency(problem: Problem, ellipse: Ellipse, rule: str = "natural") -> float:
-    """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse."""
+    """Natural frequency of a pendulum as long as the centre of an ellipse is below the plane of the spools."""
     depth = float(np.asarray(ellipse.centre) @ np.asarray(plane_normal(problem.robot)))
     if not depth > 0.0:
         raise InputError("frequency", rule, "a number: the centre is not below the spools")
@@ -119,7 +119,7 @@ def sampled_slacks(
 
 @persistent_jit
 def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, ...]:
-    # Rotations, angular velocities and accelerations at angles of turns with rates, leaves (n, ...).
+    # Return rotations, angular velocities and accelerations, leaves (n, ...), at angles that change at given rates.
     static = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))
 
     def one(angle: Array, rate: Array) -> tuple[Array, ...]:
@@ -132,7 +132,7 @@ def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, 
 
 
 def _outermost(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
-    # The fastest, or the slowest, frequency whose samples are feasible.
+    # Return the fastest, or the slowest, frequency whose samples are feasible.
     grid = np.geomspace(max(low, natural / WIDEST), high, GRID)
     order = grid[::-1] if rule == "fastest" else grid
     feasible = np.flatnonzero(slack(order) > 0.0)
@@ -150,7 +150,7 @@ def _outermost(slack: Callable, low: float, high: float, natural: float, rule: s
 
 
 def _largest(slack: Callable, low: float, high: float, natural: float) -> float:
-    # The frequency whose smallest sampled slack is the largest: a grid that is narrowed about its best point.
+    # Return the frequency with the largest smallest slack, by grids that narrow about the best point.
     grid = np.geomspace(low, high, GRID)
     values = slack(grid)
     if not values.max() > 0.0:

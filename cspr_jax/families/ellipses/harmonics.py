@@ -7,8 +7,8 @@ the depth of x below that of C, D the depth of C, and e = 1 - w^2 D / g. Times a
 
     kappa = F(C) (1 + (1 - e) eta / D) + e (F(x) - F(C)),
 
-in which the products of first harmonics have cancelled: a constant and one harmonic. On three cables kappa is the
-normalised pseudotension of the cable opposite to the edge. Its smallest value is a formula, without samples; the
+in which the products of first harmonics have cancelled: it is a constant and one harmonic. On three cables kappa is the
+normalised pseudotension of the cable opposite to the edge. A formula gives its smallest value without samples; the
 frequencies at which it stays positive are an interval of e around 0, the natural frequency sqrt(g / D), at which every
 ellipse below the spools is feasible whose centre lies below the hull.
 
@@ -30,9 +30,9 @@ from cspr_jax.families.ellipses.hull import SpoolHull
 from cspr_jax.numerics.batches import in_batches, in_parts
 from cspr_jax.numerics.shapes import Float
 
-BATCH = 16384  # ellipses
-LARGEST = 1 << 20  # ellipses in the part of one of two threads
-# Halvings that narrow e to the last bit.
+BATCH = 16384  # number of ellipses computed at a time
+LARGEST = 1 << 20  # largest number of ellipses for one of two threads
+# Number of bisections that determine e to the last bit.
 HALVINGS = 64
 
 
@@ -51,15 +51,15 @@ class Ellipse(NamedTuple):
 
 
 class _Edge(NamedTuple):
-    # kappa of one edge is `constant` and the harmonic `tilting` + e `pulling`, of cosine and sine.
+    # kappa of one edge is `constant` plus a harmonic with the cosine and sine coefficients `tilting` + e `pulling`.
     constant: Array
     tilting: tuple[Array, Array]
     pulling: tuple[Array, Array]
 
 
 class _Terms(NamedTuple):
-    # Edge by edge, since XLA computes a stack once for each of its elements; depth of the centre, () m, and the norm of
-    # the harmonic of the depth, () m.
+    # Edge by edge, since XLA computes a stack once for each of its elements; `depth` is that of the centre, () m, and
+    # `swing` the norm of the harmonic of the depth, () m.
     edges: list[_Edge]
     depth: Array
     swing: Array
@@ -88,7 +88,7 @@ def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
 
 
 def _slacks(terms: _Terms, e: Array) -> list[Array]:
-    # Smallest kappa of each edge.
+    # Return the smallest kappa of each edge.
     return [
         constant - _norm((tilting[0] + e * pulling[0], tilting[1] + e * pulling[1]))
         for constant, tilting, pulling in terms.edges
@@ -96,7 +96,7 @@ def _slacks(terms: _Terms, e: Array) -> list[Array]:
 
 
 def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Float[Array, ""]) -> Float[Array, "n_edges+1"]:
-    """Smallest values along an ellipse, all positive exactly if it is feasible."""
+    """Smallest values of kappa and of the depth along an ellipse; it is feasible exactly if all are positive."""
     return jnp.stack(_margins(hull, ellipse, frequency))
 
 
@@ -110,12 +110,12 @@ def _margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> list[Array]
 
 
 def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Float[Array, ""]) -> Float[Array, ""]:
-    """Smallest of the margins along an ellipse."""
+    """The smallest margin along an ellipse."""
     return reduce(jnp.minimum, _margins(hull, ellipse, frequency))
 
 
 def _roots(terms: _Terms) -> tuple[Array, Array]:
-    # Ends of the e at which the first edge is met, () below and above 0; without ends, infinite.
+    # Return the nearest e below and above 0, () each, at which an edge is reached; infinite if there is none.
     pairs = [_roots_of_edge(edge) for edge in terms.edges]
     return reduce(jnp.maximum, [low for low, _ in pairs]), reduce(jnp.minimum, [high for _, high in pairs])
 
@@ -125,7 +125,7 @@ def _roots_of_edge(edge: _Edge) -> tuple[Array, Array]:
     square = pulling[0] ** 2 + pulling[1] ** 2
     mixed = tilting[0] * pulling[0] + tilting[1] * pulling[1]
     rest = edge.constant**2 - (tilting[0] ** 2 + tilting[1] ** 2)
-    # The root in which nothing cancels gives the other by their product.
+    # Compute the root without cancellation; the product of both gives the other.
     far = -(mixed + jnp.copysign(jnp.sqrt(mixed**2 + square * jnp.maximum(rest, 0.0)), mixed))
     ends = far / square, -rest / far
     has_ends = square > 0.0
@@ -139,7 +139,7 @@ def _exists(terms: _Terms) -> Array:
 
 
 def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Frequencies at which an ellipse is feasible: between two ends, which are not."""
+    """Ends of the interval of feasible frequencies, which are themselves not feasible."""
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
     exists = _exists(terms)
@@ -153,12 +153,12 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
 
-    # The minimum of concave functions is concave: it rises up to its largest value.
+    # The minimum of concave functions is concave: bisect for the e at which it stops rising.
     def halved(_, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (ends[0] + ends[1])
         rates = jnp.stack([_decrease(edge, middle) for edge in terms.edges])
         rate = rates[jnp.argmin(jnp.stack(_slacks(terms, middle)))]
-        # If the slack does not depend on the frequency, as without axes, take the one nearest to the natural one.
+        # If the slack does not depend on the frequency, as without axes, take the nearest to the natural one.
         rises = (rate < 0.0) | ((rate == 0.0) & (middle < 0.0))
         return jnp.where(rises, middle, ends[0]), jnp.where(rises, ends[1], middle)
 
@@ -171,7 +171,7 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
 
 
 def _decrease(edge: _Edge, e: Array) -> Array:
-    # A positive number times the rate at which kappa of an edge decreases with e.
+    # Return the rate at which kappa of an edge decreases with e, times a positive number.
     (t0, t1), (p0, p1) = edge.tilting, edge.pulling
     return (t0 + e * p0) * p0 + (t1 + e * p1) * p1
 
@@ -182,7 +182,7 @@ def _each(function, hull: SpoolHull, items):
 
 
 def of_many(function, hull: SpoolHull, *items):
-    """One of the functions above for many ellipses."""
+    """One of the functions above, for a batch of ellipses."""
 
     def part(index: slice):
         return in_batches(

@@ -1,4 +1,4 @@
-"""Hull of the spools seen from above, by affine functions that are 1 at the centroid and 0 on one edge each."""
+"""Hull of the spools seen from above, described by affine functions, each 1 at the centroid and 0 on one edge."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
 
-# Spools count as coplanar within this distance of a plane, over the radius of the robot.
+# Spools count as coplanar if their distances from a plane are below this fraction of the robot's radius.
 IN_PLANE = 1e-9
 
 
@@ -22,8 +22,8 @@ class SpoolHull(NamedTuple):
     """Hull of the spools, and the plane that they lie in.
 
     Fields:
-        edges: (n_edges, 2) gradients over x and y of the functions, 1/m.
-        normal: (3,) of the plane, with third component 1.
+        edges: (n_edges, 2) gradients of the affine functions over x and y, 1/m.
+        normal: (3,) normal of the plane, with third component 1.
         gravity: () m/s^2.
     """
 
@@ -47,7 +47,7 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
 
 
 def formula_hull(robot: AnyRobot) -> SpoolHull | None:
-    """Hull of the spools of a robot for which formulas hold."""
+    """Hull of the spools if the formulas hold for the robot, else None."""
     try:
         return hull_of(robot)
     except InputError:
@@ -65,7 +65,7 @@ def edge_ends(points: Float[np.ndarray, "n_cables 3"], dof: int) -> Int[np.ndarr
 
 
 def _gradient(ends: np.ndarray, dof: int) -> np.ndarray:
-    # Gradient of the function that is 1 at the origin and 0 at the ends of an edge.
+    # Return the gradient of the function that is 1 at the origin and 0 at the ends of an edge.
     if dof < SPATIAL:
         return np.array([-1.0 / ends[0, 0], 0.0])
     return np.linalg.solve(ends, -np.ones(len(ends)))

@@ -1,4 +1,4 @@
-"""Leg of ellipses: poses on ellipses and at rest, joined by transfers from one to another and by turns."""
+"""Leg of ellipses: poses on ellipses and at rest, joined by transfers and turns."""
 
 import dataclasses
 import itertools
@@ -47,11 +47,11 @@ from cspr_jax.verification.proved_answers import answers_of, verify_all_robots
 
 @dataclasses.dataclass(frozen=True)
 class EllipseAnswers(Answers):
-    """Answers of segments that end on ellipses, or at rest; margins are those of the tensions, in N.
+    """Answers of segments that end on ellipses or at rest; margins are distances of tensions from their limits, N.
 
     Fields:
-        of_ellipses: (n,) details of the ellipse on which each segment ends, or, if it ends at rest, starts.
-        flight_time: (n,) time of the flight of an object that is released at the end of each segment, s; NaN without.
+        of_ellipses: (n,) details of the ellipse on which each segment ends; if it ends at rest, on which it starts.
+        flight_time: (n,) time of flight of an object that is released at the end of the segment, s; NaN if none is.
     """
 
     of_ellipses: np.ndarray
@@ -73,7 +73,7 @@ class Ellipses(Leg):
         for i, pose in enumerate(waypoints.poses):
             self._check_pose(i, pose)
         launch, count = waypoints.plan_file.launch, len(waypoints)
-        # Number of the pose of the release, if it is one of these.
+        # Index of the pose of the release, if it is in this leg.
         of_launch = 0 if launch is None else launch.segment - waypoints.first + 1
         self._of_launch = of_launch if 0 < of_launch <= count else None
         if self._of_launch and waypoints.robot_file.is_platform:
@@ -99,7 +99,7 @@ class Ellipses(Leg):
             return None
         at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
         motion = cast(EllipseMotion, joined.motions[at])
-        # Late objects are released after the segment: on the next one, else on the same ellipse.
+        # An object released late leaves the next segment; after the last one, the same ellipse.
         after = (
             joined.motions[at + 1]
             if at + 1 < len(self)
@@ -147,7 +147,7 @@ class Ellipses(Leg):
             raise ConfigError(waypoints.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
             raise ConfigError(waypoints.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
-        # Families before and after need the position of the pose that they share.
+        # Adjacent families need the position of the pose that they share.
         is_shared = (i == 0 and waypoints.first > 0) or (
             i == len(waypoints) and waypoints.last < len(waypoints.plan_file.pose) - 1
         )
@@ -160,7 +160,7 @@ class Ellipses(Leg):
             raise ConfigError(waypoints.path, f"{name}.rest = true: must follow an ellipse, not another rest")
 
     def _key(self, i: int, name: str) -> str:
-        # Name of a key of an ellipse in messages.
+        # Return the name of a key of an ellipse for messages.
         return (
             f"ellipse.{name}"
             if self.waypoints.plan_file.ellipse is not None
@@ -182,7 +182,7 @@ class Ellipses(Leg):
             )
 
     def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
-        # Return the ellipse of each pose, at the angle at which it is reached.
+        # Return the ellipse of each pose, with the angle at which the motion arrives.
         waypoints, turnings = self.waypoints, list[Turning]()
         centres = waypoints.points(z0)
         for i, pose in enumerate(waypoints.poses):
@@ -213,7 +213,7 @@ class Ellipses(Leg):
         return {"axis": axis / np.linalg.norm(axis), "oscillation": parts}
 
     def _check_axes(self, turnings: list[Turning], i: int) -> None:
-        # Two oscillations must have one axis, so that the angle of one can change into that of the other.
+        # Two oscillations must have the same axis, so that one angle can change into the other.
         before, after = turnings[max(i - 1, 0)], turnings[i]
         if before.oscillation.any() and after.oscillation.any() and not np.allclose(before.axis, after.axis):
             key = self._key(i, "oscillation.axis")

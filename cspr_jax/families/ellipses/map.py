@@ -17,7 +17,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 MAX_CABLES = 250
-# Relative error of ends of intervals.
+# Relative error allowed at ends of intervals.
 CHECK_ERROR = 1e-9
 
 
@@ -28,7 +28,7 @@ class EllipseMap(PointMassMap):
     proves = True
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
-        """Refuse ellipses without a size, or with two, and frequencies for which there is no rule."""
+        """Refuse ellipses with no radius or with two kinds of it, and frequencies without a rule."""
         super().__init__(robot_file, sweep_file, file)
         robot, axes = self._problem.robot, sweep_file.axes
         self._ellipse, self._is_planar = sweep_file.ellipse or SweepEllipse(), robot.dof == PLANAR
@@ -86,7 +86,7 @@ class EllipseMap(PointMassMap):
         }
 
     def _check_plane(self) -> None:
-        # Ellipses of a planar robot lie in its plane.
+        # Ellipses of a planar robot lie in the plane of its motion.
         if not self._is_planar:
             return
         for name in ("tilt", "tilt_azimuth"):

@@ -1,11 +1,11 @@
-"""Motion on harmonic ellipses: turns on one, and transfers from one to another, from rest or to rest.
+"""Motion on harmonic ellipses: turns on an ellipse, and transfers between ellipses, from rest or to rest.
 
-Along a law s from 0 to 1 centre, axes and frequency go from those of the first ellipse to those of the last:
+Along a law s from 0 to 1, centre, axes and frequency go from those of the first ellipse to those of the last:
 
     x = C + a cos(theta) + b sin(theta),    C = C0 + s (C1 - C0), a and b likewise,    theta' = w0 + s (w1 - w0).
 
 The first two derivatives of the law are zero at its start and its end, so that position, velocity and acceleration at
-both ends are those of the ellipses. Rest is an ellipse whose axes are zero; a law that is constant, turns on one
+both ends are those of the ellipses. Rest is an ellipse whose axes are zero; with a constant law the motion turns on one
 ellipse.
 """
 
@@ -33,24 +33,24 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
 
-# Blocks of which bounds are computed at a time.
+# Number of blocks whose bounds are computed at a time.
 BATCH = 64
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class EllipseMotion:
-    """Motion from one ellipse to another, and turns on the last one; see `Motion`.
+    """Motion from one ellipse to another, and turns on the latter; see `Motion`.
 
     Fields:
         first: the ellipse at the start, leaves (3,).
         last: the ellipse at the end.
-        frequencies: (2,) of both, rad/s.
+        frequencies: (2,) frequencies of the first and the last ellipse, rad/s.
         phase: () angle theta at the start, rad.
-        law: s over normalised time.
-        progress: integral of the law from the start on.
+        law: s as a function of normalised time.
+        progress: integral of the law from the start.
         time: () duration, s.
-        rotation: of a platform; None for a point mass.
+        rotation: rotation of a platform; None for a point mass.
     """
 
     first: Ellipse
@@ -64,7 +64,7 @@ class EllipseMotion:
 
     @property
     def z0(self) -> Array:
-        """Depth at which slacks are normalised: that of the last centre, () m."""
+        """Depth at which slacks are normalised, that of the last centre, () m."""
         return self.last.centre[..., 2]
 
     def duration(self) -> Array:
@@ -101,8 +101,8 @@ class EllipseMotion:
 
 
 def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:
-    # Position, velocity and acceleration from s and its two derivatives in time, from cosine and sine of the angle, and
-    # from its two derivatives; of numbers or of their bounds.
+    # Return position, velocity and acceleration from s and the cosine and sine of the angle, with two time derivatives
+    # of s and of the angle; works on numbers and on bounds.
     spans = [after - before for before, after in zip(first, last, strict=True)]
     cosine, sine = turns
     a, b = (s[0] * span + start for span, start in zip(spans[1:], first[1:], strict=True))
@@ -118,7 +118,7 @@ def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tu
 
 
 def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:
-    # The angle of the oscillation moves along a line as positions do along an ellipse.
+    # The angle of oscillation follows p cos(theta) + q sin(theta), as positions follow an ellipse.
     first, last = (Ellipse(jnp.zeros_like(parts[0]), parts[0], parts[1]) for parts in (rotation.first, rotation.last))
     return _kinematics(first, last, s, turns, rates)
 
@@ -152,7 +152,7 @@ def turning(ellipse: Ellipse, frequency: Float[Array, ""], phase: Float[Array, "
 
 
 def with_turns(amplitude: Amplitude, fraction: float) -> Amplitude:
-    """Law of a transfer that takes a fraction of the time, and of turns for the rest."""
+    """Law that makes a transfer in a fraction of the time, and turns for the rest."""
     if fraction == 0.0:
         return from_pieces("1", (), (0.0,), ((1.0,),))
     powers = fraction ** -np.arange(amplitude.coefficients.shape[1])
@@ -164,7 +164,7 @@ def with_turns(amplitude: Amplitude, fraction: float) -> Amplitude:
 
 
 def integral(law: Amplitude) -> Amplitude:
-    """Integral of a law from the start on."""
+    """Integral of a law from its start."""
     origins, knots = np.asarray(law.origins), np.asarray(law.knots)
     pieces, value = [], 0.0
     for coefficients, origin, first, last in zip(law.coefficients, origins, [0.0, *knots], [*knots, 1.0], strict=True):

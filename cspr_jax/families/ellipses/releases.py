@@ -1,6 +1,6 @@
-"""Releases from ellipses: the ellipse that passes a point with a given velocity, and choices that a launch leaves open.
+"""Releases from ellipses: the ellipse through a point with a given velocity, and the choice of what is left open.
 
-An object that is to leave at the point p with the velocity v leaves the ellipse
+An object that is to be released at p with velocity v is on the ellipse
 
     x = C + (p - C) cos(angle) + (v / w) sin(angle)
 
@@ -8,7 +8,7 @@ at the angle 0. At the natural frequency w it is feasible exactly if C lies belo
 
     (rise of p - C)^2 + (rise of v / w)^2 < D^2,
 
-with rises towards the plane of the spools and D the depth of C (`harmonics`): however far aside p lies.
+with rises towards the plane of the spools and D the depth of C (`harmonics`), however far p lies to the side.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
 
-# Times of flight of a grid, over the time of a fall from the plane of the spools to the centre, and their number.
+# Shortest and longest time of flight of a grid, over the time of a fall from the spools to the centre, and its number.
 SHORTEST = 0.01
 LONGEST = 100.0
 GRID = 257
@@ -42,17 +42,17 @@ PROVED_HALVINGS = 24  # of such an interval, by proofs
 PASSES = 8  # grids, each about the best time of the one before
 # Distances from an end of the feasible times that are tried, over the distance to their middle.
 INSIDE = (1e-3, 1e-2, 1e-1)
-SAMPLES = 256  # of a transfer
-# Frequencies are sought from 1 / WIDEST to WIDEST times the natural one.
+SAMPLES = 256  # samples of a transfer
+# Frequencies are searched for from 1 / WIDEST to WIDEST times the natural one.
 WIDEST = 100.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Release(Turning):
-    """Ellipse from which an object is released, at a whole number of turns; see `Turning`.
+    """Ellipse from which an object is released after a whole number of turns; see `Turning`.
 
     Fields:
-        flight_time: s.
+        flight_time: time of flight, s.
     """
 
     flight_time: float = math.nan
@@ -61,12 +61,12 @@ class Release(Turning):
 class ReleaseRequirement(NamedTuple):
     """Requirements of a release.
 
-    Fields:
+    scene: bodies that can touch each other.
         problem: robot and limits.
         scene: bodies that can meet.
         parabola: flight of the object.
-        centre: (3,) of the ellipse, from the centroid of the spools, z down, m.
-        turns: on the ellipse before the release.
+        centre: (3,) centre of the ellipse, from the centroid of the spools, z down, m.
+        turns: number of turns on the ellipse before the release.
     """
 
     problem: Problem
@@ -76,7 +76,7 @@ class ReleaseRequirement(NamedTuple):
     turns: float
 
     def states(self, times: Any) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-        """Position and velocity of the release."""
+        """Positions and velocities of releases, by time of flight."""
         parabola, gravity = self.parabola, self.problem.robot.gravity
         time = np.asarray(times, float)[:, None]
         if parabola.point is None:
@@ -85,14 +85,14 @@ class ReleaseRequirement(NamedTuple):
         return np.broadcast_to(parabola.point, velocity.shape), velocity
 
     def ellipses(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Ellipse:
-        """Ellipses that pass the point of the release with its velocity."""
+        """Ellipses through the points of release with the velocities of release."""
         position, velocity = self.states(times)
         return Ellipse(
             np.broadcast_to(self.centre, position.shape), position - self.centre, velocity / frequencies[:, None]
         )
 
     def slacks(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-        """Slacks of the ellipses, positive where they are feasible: of samples, and of formulas where these hold."""
+        """Slacks of the ellipses, positive if feasible: the smaller of samples' and, where they hold, formulas'."""
         ellipses = self.ellipses(times, frequencies)
         each = Ellipse(*(array[:, None] for array in ellipses))
         return np.fmin(self.margins(ellipses, frequencies), sampled_slacks(self.problem, each, frequencies, self.scene))
@@ -105,7 +105,7 @@ class ReleaseRequirement(NamedTuple):
         return harmonics.of_many(harmonics.least_margin, hull, ellipses, frequencies)
 
     def release(self, time: float, frequency: float) -> Release:
-        """Release after a whole number of turns."""
+        """Release after a given time of flight, at a given frequency, after a whole number of turns."""
         ellipse = Ellipse(*(array[0] for array in self.ellipses([time], np.array([frequency]))))
         return Release(ellipse, frequency, -2.0 * math.pi * self.turns, flight_time=time)
 
@@ -113,7 +113,7 @@ class ReleaseRequirement(NamedTuple):
 def chosen_release(
     requirement: ReleaseRequirement, before: Turning, rule: str | float, choose: str | None, arcs: range
 ) -> Release:
-    """Release of a launch, with the time of flight and the frequency chosen where the launch does not give them."""
+    """Release of a launch; time of flight and frequency are chosen where the launch does not give them."""
     nothing = np.zeros(3)
     natural = natural_frequency(requirement.problem, Ellipse(requirement.centre, nothing, nothing))
     frequency, time = rule if isinstance(rule, float) else natural, requirement.parabola.time
@@ -138,7 +138,7 @@ def _by_rule(requirement: ReleaseRequirement, time: float, rule: str, natural: f
 
 
 class _Times:
-    # Times of flight at one frequency, and which of them have feasible ellipses.
+    # A grid of times of flight at one frequency, and the slacks of their ellipses.
 
     def __init__(self, requirement: ReleaseRequirement, frequency: float, natural: float) -> None:
         self._requirement = self._allowed = requirement
@@ -176,7 +176,7 @@ class _Times:
         energy = (self._requirement.states(self._grid)[1] ** 2).sum(1)
         at = int(feasible[energy[feasible].argmin()])
         inside, grid = float(self._grid[at]), self._grid
-        # No time of the grid is feasible between this time and the minimum.
+        # The grid has no feasible time between this one and the minimum.
         if inside < lowest:
             outside = min(lowest, grid[grid > inside].min(initial=np.inf))
         else:
@@ -252,8 +252,8 @@ class _Times:
         return (requirement or self._allowed).slacks(times, np.full(len(times), self._frequency))
 
     def _slowest(self) -> float:
-        # The time of flight with the slowest release, by a formula; if the velocity at the target is given, the release
-        # is slowest at the summit of the parabola.
+        # Return the time of flight of the slowest release, by a formula; if the velocity at the target is given, the
+        # release is slowest at the summit of the parabola.
         parabola, gravity = self._requirement.parabola, float(self._requirement.problem.robot.gravity)
         if parabola.velocity is None:
             time = math.sqrt(2.0 * float(np.linalg.norm(parabola.target - parabola.point)) / gravity)
@@ -262,7 +262,7 @@ class _Times:
         return max(time, float(self._grid[0]))
 
     def _middle(self, at: int) -> float:
-        # The time of the largest slack among the feasible ones around a feasible one.
+        # Return the time of largest slack in the feasible interval around a feasible time.
         is_out = np.flatnonzero(self._slacks <= 0.0)
         low, high = is_out[is_out < at].max(initial=-1) + 1, is_out[is_out > at].min(initial=GRID)
         return float(self._grid[low + self._slacks[low:high].argmax()])

@@ -1,9 +1,9 @@
-"""Orientations of platforms on ellipses: from one mean orientation to another, and an oscillation about one axis.
+"""Orientations of platforms on ellipses: a turn between mean orientations, and an oscillation about one axis.
 
     R = Q(axis, psi) S(s turn) R0,    psi = p cos(theta) + q sin(theta),
 
 with the law s of the transfer and the angle theta of the ellipse; p and q go from those of the first ellipse to those
-of the last one, as its half-axes do.
+of the last along s, as the half-axes do.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class Rotation(NamedTuple):
 
     Fields:
         start: (4,) first mean orientation, a unit quaternion, scalar first.
-        turn: (3,) from the first mean orientation to the last one, about its direction, fixed axes, rad.
-        axis: (3,) unit vector of the oscillation, fixed axes.
+        turn: (3,) rotation vector from the first mean orientation to the last one, fixed axes, rad.
+        axis: (3,) unit vector of the axis of oscillation, fixed axes.
         first: (2,) p and q on the first ellipse, rad.
-        last: (2,) on the last one, rad.
+        last: (2,) p and q on the last ellipse, rad.
     """
 
     start: Any
@@ -42,7 +42,7 @@ class Rotation(NamedTuple):
 
 
 def turn_between(start: Float[np.ndarray, "4"], end: Float[np.ndarray, "4"]) -> Float[Array, "3"]:
-    """Shortest rotation from one orientation to another."""
+    """Rotation vector of the shortest rotation from one orientation to another."""
     quaternion = rotations.products(end[None], start[None] * np.array([1.0, -1.0, -1.0, -1.0]))[0]
     quaternion = quaternion * (1.0 if quaternion[0] >= 0.0 else -1.0)
     sine = float(np.linalg.norm(quaternion[1:]))
@@ -55,7 +55,7 @@ def _quaternion(axis: Array, angle: Array) -> Array:
 
 
 def _direction(vector: Array) -> tuple[Array, Array]:
-    # Unit vector along a vector, and its length; (1, 0, 0) if the length is zero.
+    # Return a vector's direction and length; the direction is (1, 0, 0) if the length is zero.
     norm = length(vector)
     return jnp.where(norm > 0.0, vector / jnp.where(norm > 0.0, norm, 1.0), jnp.eye(3)[0]), norm
 

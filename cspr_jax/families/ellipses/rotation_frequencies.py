@@ -1,4 +1,4 @@
-"""Natural frequencies of rotation of a platform about its rest in a pose.
+"""Natural frequencies of rotation of a platform about its pose at rest.
 
 At rest the cables pull with forces tau_k (c_k - r_k), r_k and c_k from the mass centre to attachment point and spool.
 Where a platform moves by a small u and rotates by a small delta while these tau_k, tensions over lengths, stay
@@ -6,10 +6,10 @@ constant, force and moment about the mass centre change by
 
     -(sum tau_k) u + S x delta,    -S x u - sum_k tau_k ((r_k . c_k) delta - r_k (c_k . delta)),    S = sum_k tau_k r_k,
 
-as the force of a pendulum changes with its displacement. With mass and inertia these have six natural modes; at their
-frequencies a small oscillation asks for no change of tau_k to first order. Where S is zero, as in a symmetric reference
-pose, three of them are translations at sqrt(sum tau_k / m) and three are rotations about the mass centre; elsewhere
-those three count as rotations in which the kinetic energy of rotation is the largest part.
+as the force of a pendulum changes with its displacement. With mass and inertia this system has six natural modes; a
+small oscillation at their frequencies needs no change of tau_k to first order. Where S is zero, as in a symmetric
+reference pose, three modes are translations at sqrt(sum tau_k / m) and three are rotations about the mass centre;
+elsewhere the three modes with the largest fraction of kinetic energy in rotation count as rotations.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class RotationFrequencies(NamedTuple):
     """Natural frequencies of rotation.
 
     Fields:
-        frequencies: (3,) rad/s, the lowest first; NaN where the rest is not stable.
-        modes: (3, 6) displacement of the mass centre, m, beside a rotation of length 1, rad, fixed axes.
+        frequencies: (3,) rad/s, in ascending order; NaN where the rest is not stable.
+        modes: (3, 6) displacement of the mass centre, m, then a rotation vector of length 1 rad, fixed axes.
     """
 
     frequencies: np.ndarray
@@ -48,7 +48,7 @@ def rotation_frequencies(
     if not np.isfinite(stiffness).all():
         return RotationFrequencies(np.full(3, np.nan), np.full((3, 6), np.nan))
     squares, modes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), inertia)
-    # Modes have the kinetic energy 1 / 2 at the speed 1.
+    # Modes are scaled so that their kinetic energy is 1/2 at unit speed: return the fractions due to rotation.
     fractions = np.einsum("im,ij,jm->m", modes[3:], inertia[3:, 3:], modes[3:])
     chosen = np.sort(np.argsort(-fractions)[:3])
     frequencies = np.sqrt(np.where(squares > 0.0, squares, np.nan))[chosen]
@@ -58,7 +58,7 @@ def rotation_frequencies(
 
 @jax.jit
 def _matrices(problem: Problem, position: jax.Array, rotation: jax.Array) -> Any:
-    # Stiffness and inertia over (u, delta), (6, 6) each.
+    # Return stiffness and inertia over (u, delta), (6, 6) each.
     robot: PlatformRobot = problem.robot
     nothing = jnp.zeros(3)
     state = State(position, nothing, nothing, rotation, nothing, nothing)

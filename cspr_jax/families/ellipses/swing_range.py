@@ -1,13 +1,13 @@
-"""Range of swings: the slowest release to each landing point from an ellipse about a centre, at its natural frequency.
+"""Swing range: the slowest release to each landing point, from an ellipse about a centre at its natural frequency.
 
-After the time of flight t the object is at the target if the velocity of the release p is (q - p) / t, with q the point
-above the target from which it would fall there in that time. With depths below the plane of the spools, D that of the
-centre, the ellipse is feasible exactly if the centre lies below the hull of the spools and (`releases`)
+Released at p with velocity (q - p) / t, the object hits the target after the time of flight t; q is the point above the
+target from which an object at rest would fall to it in that time. With depths below the plane of the spools, and D that
+of the centre, the ellipse is feasible exactly if the centre lies below the hull of the spools and (`releases`)
 
     (depth of p - D)^2 + (depth of q - depth of p)^2 / (w t)^2 < D^2,
 
-an interval of the depth of p; a floor gives one of its height likewise. So for each time of flight the slowest release
-is the point of a box, cut by planes parallel to that of the spools, that is nearest to q. Times of flight are searched.
+an interval of the depth of p; a floor gives an interval of its height likewise. So for each time of flight, the slowest
+release is the point nearest to q of a box cut by planes parallel to that of the spools. Times of flight are searched.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ AROUND = 33  # times of each narrower grid about the best one
 NARROWED = 8  # how often
 # Fraction of the depth of its centre that an ellipse keeps from the plane of the spools.
 KEPT = 1e-6
-# Bound of the rounding of margins.
+# Bound of the rounding errors of margins.
 MARGIN_ERROR = 1e-13
-HALVINGS = 80  # that find a nearest point
-TOGETHER = 256  # cells at a time
-# Gradients of the plane of the spools that count as none.
+HALVINGS = 80  # bisections for a nearest point
+TOGETHER = 256  # number of cells computed at a time
+# Components of the normal of the spool plane up to this value count as zero.
 LEVEL = 1e-9
 
 
@@ -47,8 +47,8 @@ LEVEL = 1e-9
 class SwingRange(Releases):
     """Slowest releases from ellipses to n landing points; see `Releases`.
 
-    Where there is none, the verdict says what fails at all times of flight that were tried. Margins are those of taut
-    cables and of the depth; the one of the floor is over the depth of the centre.
+    Where there is no release, the verdict says what fails at all times of flight tried. Margins are the smallest
+    slacks of taut cables and of the depth; the slack of the floor is relative to the depth of the centre.
 
     Fields:
         swing_amplitude: (n,) largest distance of the ellipse from its centre, m.
@@ -58,13 +58,13 @@ class SwingRange(Releases):
 
 
 def other_limit(limits: Limits) -> str | None:
-    """Name of a limit other than a floor, which no formula here knows."""
+    """Name of a limit other than a floor, which the formulas here do not cover; None if there is none."""
     names = [row.name for row in limits_set(limits) if row.name != "floor"]
     return next(iter([*names, *(["uncertainty"] if limits.uncertainty is not None else [])]), None)
 
 
 class _Cells(NamedTuple):
-    # Centres and targets of n cells, depths of the centres below the plane of the spools, natural frequencies (n, 1).
+    # Centres and targets of n cells, depths of the centres below the spool plane, natural frequencies (n, 1).
     centre: np.ndarray
     target: np.ndarray
     depth: np.ndarray
@@ -81,8 +81,8 @@ class _Space(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    # At (n, k) times of flight: the slowest release, (n, k, 3), its speed, inf without one, and the largest slacks that
-    # ellipses leave below the plane of the spools and above the floor, over the depth of the centre.
+    # Results at (n, k) times of flight: the slowest release, (n, k, 3), its speed (inf without a release), and the
+    # largest slacks of ellipses to the spool plane and to the floor, over the depth of the centre.
     position: np.ndarray
     speed: np.ndarray
     below: np.ndarray
@@ -101,7 +101,7 @@ def swing_range(
     missed = TOUCHED * float(spool_radius(robot))
     space = _Space(np.asarray(hull.normal), float(robot.gravity), box, np.inf if floor is None else floor, missed)
     depth = _depth(centres, space.normal)
-    # Above the spools there is no swing, and any numbers do.
+    # Above the spools there is no swing: replace depths by 1 to avoid NaN.
     cells = _Cells(centres, targets, np.where(depth > 0.0, depth, 1.0), np.zeros((len(centres), 1)))
     cells = cells._replace(frequency=np.sqrt(space.gravity / cells.depth)[:, None])
     parts = [slice(i, i + TOGETHER) for i in range(0, len(centres), TOGETHER)]
@@ -117,7 +117,7 @@ def swing_range(
     lost = np.where(static > 0.0, np.where(lost == 0, Verdict.UNDECIDED.value, lost), Verdict.SLACK_CABLE.value)
     lost = np.where(np.abs(static) > MARGIN_ERROR, lost, Verdict.UNDECIDED.value)
     lost = np.where(depth > 0.0, lost, Verdict.ABOVE_SPOOLS.value)
-    # The larger half-axis, from the eigenvalues of a a + b b.
+    # Return the larger half-axis, from the eigenvalues of a a + b b.
     squares = [np.sum(one * other, axis=1) for one, other in ((ellipse[1],) * 2, (ellipse[2],) * 2, ellipse[1:])]
     amplitude = np.sqrt(0.5 * (squares[0] + squares[1]) + np.hypot(0.5 * (squares[0] - squares[1]), squares[2]))
 
@@ -132,12 +132,12 @@ def swing_range(
 
 
 def _depth(positions: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    # Below the plane of the spools, (...) m; a product of matrices would round by the number of points.
+    # Return depths below the spool plane, (...) m; a matrix product would round differently by number of points.
     return positions[..., 0] * normal[0] + positions[..., 1] * normal[1] + positions[..., 2] * normal[2]
 
 
 def _above(space: _Space, cells: _Cells, times: np.ndarray) -> np.ndarray:
-    # Points from which the object would fall to the target, (n, k, 3).
+    # Return the points q from which an object would fall to the target, (n, k, 3).
     drop = 0.5 * space.gravity * times[..., None] ** 2
     return cells.target[:, None] - drop * np.array([0.0, 0.0, 1.0])
 
@@ -145,7 +145,7 @@ def _above(space: _Space, cells: _Cells, times: np.ndarray) -> np.ndarray:
 def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     normal, (low, high) = space.normal, space.box
     fallen, fraction = _above(space, cells, times), 1.0 / (cells.frequency * times) ** 2
-    # Depths that the box has, and those that ellipses leave.
+    # Intersect the depths of the box with those that feasible ellipses allow.
     corners = np.sort(np.stack([low * normal, high * normal]), axis=0).sum(1)
     depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners, cells.depth * (1.0 - KEPT))
     height = space.floor - cells.centre[:, 2]
@@ -164,7 +164,7 @@ def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
 
 
 class _Interval(NamedTuple):
-    # Ends of a coordinate of the release, (n, k) m, NaN where there is none; and the largest slack in the box, m.
+    # Ends of an interval of a coordinate of p, (n, k) m, NaN if it is empty, and the largest slack in the box, m.
     low: np.ndarray
     high: np.ndarray
     slack: np.ndarray
@@ -186,14 +186,14 @@ def _interval(
 def _nearest(
     positions: np.ndarray, low: np.ndarray, high: np.ndarray, normal: np.ndarray, depths: _Interval
 ) -> np.ndarray:
-    # The points nearest to others in boxes whose depth lies in an interval: a shift along the normal, cut by the box.
+    # Return the nearest points in boxes whose depth lies in an interval: shift along the normal, then clip to the box.
     nearest = np.minimum(np.maximum(positions, low), high)
     depth = _depth(nearest, normal)
     goal = np.ravel(np.clip(depth, depths.low, depths.high))
     moved = np.flatnonzero((goal != np.ravel(depth)) & np.isfinite(goal))
     start, first, last = (x.reshape(-1, 3)[moved] for x in (positions, low, high))
     goal = goal[moved]
-    # A shift that takes each coordinate which it changes beyond the box.
+    # Start from a shift so large that all coordinates that it changes are clipped.
     components = np.abs(normal[np.abs(normal) > LEVEL])
     away = np.maximum(np.abs(first - start), np.abs(last - start))[:, np.abs(normal) > LEVEL]
     up = (away / components).max(1, initial=0.0)
@@ -208,10 +208,10 @@ def _nearest(
 
 
 def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
-    # Times of flight, positions and speeds of the slowest releases; slacks below the spools and above the floor at the
-    # time at which the smaller of both is the largest.
+    # Return times of flight, positions and speeds of the slowest releases, and the slacks to the spool plane and the
+    # floor at the time at which the smaller of both is largest.
     top = np.minimum(space.box.low * space.normal, space.box.high * space.normal).sum()
-    # Longer flights rise above the spools.
+    # The longest flight starts at the highest point of the box; longer ones rise above the spools.
     drop = np.maximum((_depth(cells.target, space.normal) - top) / cells.depth, 0.0)
     longest = 1.0 + np.sqrt(1.0 + 2.0 * drop)
     times = np.geomspace(SHORTEST, 1.0, GRID) * longest[:, None] / cells.frequency

@@ -1,4 +1,4 @@
-"""Maps of throws from swings: where an object can be thrown from ellipses about a point."""
+"""Maps of throws from swings: where an object can be thrown from ellipses about a given point."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ class SwingRangeMap(ReleasesMap):
     """The slowest release from an ellipse to each landing point; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
-        """Refuse limits and keys of searches that formulas do not know."""
+        """Refuse limits that the formulas do not cover, and keys of searches."""
         super().__init__(robot_file, sweep_file, file)
         search = sweep_file.launch or LaunchSearch()
         for name in ("max_duration", "population"):

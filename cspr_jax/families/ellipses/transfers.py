@@ -1,4 +1,4 @@
-"""Transfers between ellipses: the smallest number of arcs, half turns, whose motion is proved."""
+"""Transfers between ellipses: the smallest number of arcs (half turns) whose motion is proved."""
 
 import dataclasses
 import math
@@ -16,22 +16,22 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
 from cspr_jax.verification.smallest_proved import NONE, smallest_proved
 
-# Intervals of the samples that refute most motions before a proof is tried.
+# Number of intervals between samples, which refute most motions before a proof is tried.
 FEW = 256
-# Angles that differ by less are the same, rad.
+# Angles that differ by less than this count as the same, rad.
 SAME_ANGLE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
 class Turning:
-    """Ellipse with a frequency and an angle, and the orientation of a platform on it.
+    """Ellipse with a frequency, an angle on it, and the orientation of a platform.
 
     Fields:
-        ellipse: leaves (3,); a rest has no axes.
-        frequency: rad/s; 0 for a rest, which takes that of the other end of a transfer.
+        ellipse: leaves (3,); at rest its axes are zero.
+        frequency: rad/s; 0 at rest: a transfer then has the frequency of its other end.
         phase: angle, rad.
         quaternion: (4,) mean orientation; None for a point mass.
-        axis: (3,) unit vector of the oscillation.
+        axis: (3,) unit vector of the axis of oscillation.
         oscillation: (2,) angles p and q of `rotation`, rad.
     """
 
@@ -44,11 +44,11 @@ class Turning:
 
     @property
     def rests(self) -> bool:
-        """Tell whether it is a rest."""
+        """Tell whether it is at rest."""
         return self.frequency == 0.0
 
     def is_same(self, other: "Turning") -> bool:
-        """Tell whether another one is on the same ellipse at the same frequency, at any angle."""
+        """Tell whether another one has the same ellipse and frequency, at any angle."""
         return all(np.array_equal(a, b) for a, b in zip(self._parts, other._parts, strict=True))
 
     @property
@@ -58,13 +58,13 @@ class Turning:
 
 
 class Transfer(NamedTuple):
-    """Transfer that was tried.
+    """A transfer that was tried.
 
     Fields:
-        motion: with the turns after it.
-        proof: of all of it.
+        motion: the transfer and the turns after it.
+        proof: proof of the full motion.
         arcs: number of half turns of the transfer.
-        fewer_undecided: whether a smaller number stayed undecided.
+        fewer_undecided: whether a motion with fewer arcs stayed undecided.
     """
 
     motion: EllipseMotion
@@ -74,21 +74,21 @@ class Transfer(NamedTuple):
 
 
 def step_of(first: Turning, last: Turning) -> int:
-    """Step between numbers of arcs of a transfer: 1 where the angle at a rest is free, else 2; 0 without a transfer."""
+    """Step between possible numbers of arcs: 1 if the angle at a rest is free, else 2; 0 if no transfer is needed."""
     if first.is_same(last):
         return 0
     return 1 if first.rests or last.rests else 2
 
 
 def between(first: Turning, last: Turning) -> float:
-    """Angle from the one to the other, the shortest in the direction of the motion."""
+    """Angle from one to the other, the smallest in the direction of the motion."""
     full = 2.0 * math.pi
     angle = (last.phase - first.phase) % full
     return 0.0 if min(angle, full - angle) < SAME_ANGLE else angle
 
 
 def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
-    """Motion from one ellipse to another one, and turns on that."""
+    """Motion from one ellipse to another, and turns on the latter."""
     step, full = step_of(first, last), 2.0 * math.pi
     start, end = first.frequency or last.frequency, last.frequency or first.frequency
     rest = between(first, last)
@@ -122,7 +122,7 @@ def rotation_between(first: Turning, last: Turning) -> Rotation | None:
 def smallest_transfer(
     problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
 ) -> Transfer:
-    """The transfer with the smallest number of arcs that is proved, with the turns after it."""
+    """The transfer with the smallest number of arcs that is proved, and the turns after it."""
     step, transfers = step_of(first, last), dict[int, Transfer]()
 
     def trial(_: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -142,5 +142,5 @@ def smallest_transfer(
     if undecided != NONE:
         return transfers[undecided]
     best = max(transfers.values(), key=lambda each: float((each.proof.proof.high / each.proof.scales).min()))
-    # A motion that samples have refuted is bounded for its causes.
+    # Samples have refuted this motion: prove it now for its causes.
     return best._replace(proof=proof_of(problem, best.motion, scene))

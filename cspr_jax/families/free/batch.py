@@ -23,19 +23,19 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs_of, verify_all_robots
 
 # Numbers of intervals of the first search and of the final motion. Pairs without a proved motion on one mesh are tried
-# on the next. Plans have more intervals, and motions that are some parts in a thousand faster.
+# on the next. Plans use more intervals, and their motions are some parts in a thousand faster.
 MESHES = ((12, 32), (16, 28), (24, 36))
-SAMPLES = 4  # of each interval
-TRIED = 2  # pairs of a weight and a softness that are tried on one mesh, of those in `FINE`
+SAMPLES = 4  # samples of each interval
+TRIED = 2  # number of pairs of weight and softness, from `FINE`, tried on one mesh
 
 
 class ManyFreeMotions(NamedTuple):
-    """The fastest motions that were found between pairs of poses.
+    """The fastest motions found between pairs of poses.
 
     Fields:
-        indices: (m,) of the pairs for which the search met all limits at its samples.
-        motions: m of them.
-        answers: of these: proved, refuted or undecided.
+        indices: (m,) indices of the pairs for which the search met all limits at its samples.
+        motions: the m motions.
+        answers: their verdicts: proved, refuted or undecided.
     """
 
     indices: np.ndarray
@@ -63,7 +63,7 @@ def free_motions(
 
 
 def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
-    # Indices of the pairs with a motion, the motions, and their proofs.
+    # Return the indices of the pairs with a motion, the motions, and their proofs.
     coarse, fine = (
         _stacked([question.tasks(intervals, samples) for question in questions])
         for intervals, samples in zip(mesh, (FEWEST, SAMPLES), strict=True)
@@ -90,14 +90,14 @@ def _stacked(tasks: Sequence[Tasks]) -> Tasks:
 
 
 def _refined(source: Basis, tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float) -> Unknowns:
-    # Start a search on other intervals from motions, (n, K, d).
+    # Start a search on another number of intervals from motions, (n, K, d).
     functions = BSpline(source.knots, np.eye(source.controls), DEGREE)(tasks.basis.averages)
     fitted = np.einsum("kj,ji,nid->nkd", tasks.basis.fit, functions, controls, optimize=True)
     return started(tasks, fitted[:, None], duration[:, None], barrier)
 
 
 def _first_optima(tasks: Tasks, start: Unknowns, levels: Iterable[tuple[float, float]]) -> tuple[Unknowns, np.ndarray]:
-    # For each task the optimum of the first search that converges, and whether one does.
+    # Return for each task the optimum of the first search that converges, and whether one does.
     unknowns, is_optimal = Unknowns(*(values.copy() for values in start)), np.zeros(len(start.duration), bool)
     for barrier, softness in levels:
         open_tasks = np.flatnonzero(~is_optimal)
@@ -120,7 +120,7 @@ def _put(
 def _proved(
     questions: Sequence[FreeQuestion], indices: np.ndarray, tasks: Tasks, unknowns: Unknowns
 ) -> tuple[list[Spline], list[MotionProof]]:
-    # Motions and proofs: bounds are tightened and the search repeated until all are proved, or no more can be.
+    # Return motions and proofs: tighten bounds and search again until all are proved, or no more can be.
     problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in indices.tolist()]
 
     def motion(k: int) -> Spline:
@@ -158,8 +158,8 @@ def _proved(
 
 
 def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
-    # One motion, searched again with planes that separate its bodies, which differ from motion to motion; None without
-    # a proof.
+    # Search again for one motion, with planes that separate its bodies, which differ from motion to motion; return None
+    # without a proof.
     proof = proved(question, tasks, unknowns)
     if proof.is_stopped:
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Motions of other families over the same poses, from which searches go on."""
+"""Motions of other families through the same poses, from which searches start."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,9 +17,9 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.model.point_mass import spool_radius
 
-# Motions may miss poses by this fraction of the robot's radius, and of the speed of a fall from that height.
+# Motions may miss poses by this fraction of the robot's radius, and of the speed of a fall by the radius.
 NEAR = 1e-9
-# Rodrigues vectors beyond which no search begins.
+# No search starts from Rodrigues vectors longer than this.
 FAR = 10.0
 
 
@@ -27,11 +27,11 @@ class ClosedForm(NamedTuple):
     """Motions of a family through the poses of a search.
 
     Fields:
-        family: its name.
+        family: name of the family.
         motions: n of them, in the axes of the kernels.
         is_feasible: (n,) whether each is proved.
         duration: (n,) s.
-        answers: of them, where they are proved as splines are.
+        answers: answers of the motions, from their proofs as splines.
     """
 
     family: str
@@ -48,7 +48,7 @@ class ClosedForm(NamedTuple):
 
 
 def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> list[ClosedForm]:
-    """Join poses by other families."""
+    """Join poses by motions of other families."""
     forms = list[ClosedForm]()
     for leg in legs:
         try:
@@ -65,7 +65,7 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
 
 
 def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
-    # Tell whether motions that are proved begin and end as the poses say; accelerations may differ.
+    # Tell whether motions are proved and start and end as the poses say; accelerations may differ.
     radius = float(spool_radius(problem.robot))
     speed = np.sqrt(radius * float(problem.robot.gravity))
     for i in np.flatnonzero(form.is_feasible).tolist():

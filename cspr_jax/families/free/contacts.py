@@ -1,9 +1,9 @@
-"""Planes in the space of coordinates that separate bodies where a motion brings them too near.
+"""Planes in coordinate space that separate bodies where a motion brings them too near to each other.
 
-The clearance of two bodies is linearised about the motion at each sample at which it is small; searched again within
-these planes, the motion gives new ones. Clearances of solid bodies are negative inside. Those of two cables, and of a
-cable over a platform's face, have a sign instead, which must stay that of the poses: the sign of the volume that the
-lines of the cables span, or of the height of the spool over the face.
+The clearance of two bodies is linearised about the motion at each sample at which it is small. A search within these
+planes gives a new motion, which gives new planes. Clearances of solid bodies are negative inside. For two cables, and
+for a cable over a platform's face, clearances have a sign instead, which must stay that of the poses: the sign of the
+volume that the lines of the cables span, or of the height of the spool over the face.
 """
 
 import dataclasses
@@ -26,22 +26,22 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.criteria import has_extent
 from cspr_jax.verification.piece_slacks import PieceSlacks
 
-# Lengths over the robot's radius.
+# Lengths below are relative to the robot's radius.
 NEAR = 0.1  # clearance below which bodies are separated by planes
-MIN_CLEARANCE, MAX_INCREASE = 1e-4, 0.02  # clearance that they keep at first, and its largest increase each time
-STEP = 1e-6  # of difference quotients
-# Searches round obstacles start from motions deflected by these multiples of the deflection of lines; for platforms,
-# whose searches take long, by the first alone.
+MIN_CLEARANCE, MAX_INCREASE = 1e-4, 0.02  # clearance that planes keep at first, and its largest increase per search
+STEP = 1e-6  # step of difference quotients
+# Searches round obstacles start from motions deflected by these multiples of the deflection of lines; searches for
+# platforms take long, and use the first multiple alone.
 WIDER = (1.0, 2.0)
 SLOWER = 1.5  # durations of these starts over those of the motion that meets an obstacle
-SOFTNESS = 10.0  # of the first search
-GO_ON = (1e-3, 1e-1)  # weight of the barriers and softness of further searches
+SOFTNESS = 10.0  # softness of the first search
+GO_ON = (1e-3, 1e-1)  # weight of the barriers, and softness, of further searches
 SEARCHES = 4  # largest number of searches; each is from all starts together
 
 
 class _Gap(NamedTuple):
-    # Clearance of two bodies: a function that gives it for positions (k, 3) and quaternions (k, 4) or None, (k,) m, and
-    # tells whether the bodies are near each other; whether its sign is a side; its minimum, m.
+    # Clearance of two bodies. `of_poses` maps positions (k, 3) and quaternions (k, 4) or None to clearances (k,), m,
+    # and to whether the bodies are near; `has_sides` tells whether the sign must stay; `need` is the least clearance.
     of_poses: Callable[[np.ndarray, np.ndarray | None], tuple[np.ndarray, np.ndarray]]
     has_sides: bool
     need: float
@@ -50,7 +50,7 @@ class _Gap(NamedTuple):
 def separated(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
 ) -> tuple[Tasks, Unknowns] | None:
-    """Bounds that separate bodies where a motion brings them too near."""
+    """Tasks with bounds that separate bodies which a motion brings too near, and unknowns; None if it brings none."""
     missed = -_clearances(question, slacks).min(0, initial=np.inf)
     if not (missed > 0.0).any():
         return None
@@ -66,7 +66,7 @@ def separated(
 def around(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks
 ) -> tuple[Tasks, Unknowns] | None:
-    """Search for motions round the obstacles that a motion meets, deflected to all sides, and take the best."""
+    """The best of motions round the obstacles that a motion meets; searches start from deflections to all sides."""
     is_met, radius = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
     _, pairs = _bodies(question)
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
@@ -80,8 +80,8 @@ def around(
 def _clear(
     question: FreeQuestion, tasks: Tasks, deviation: Unknowns, minimum: dict[int, float]
 ) -> tuple[Tasks, Unknowns] | None:
-    # Search from deflected motions, with planes about them, then with planes about what was found; return the best
-    # motion that is clear at all samples.
+    # Search from deflected motions, first with planes about them, then with planes about what was found; return the
+    # best motion that is clear of obstacles at all samples.
     within, begun = _parted(question, tasks, deviation, minimum, np.inf)
     begun = started(within, within.controls(begun), begun.duration)
     level, until = (BARRIERS[0], SOFTNESS), question.settings.until
@@ -110,7 +110,7 @@ def _clear(
 
 
 def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
-    # Lower bounds (n_pieces, n_pairs), m.
+    # Return lower bounds of clearances, (n_pieces, n_pairs), m.
     scene, pairs = _bodies(question)
     last = len(slacks.rows) - int(
         question.problem.limits.floor is not None and has_extent(question.problem.robot, scene)
@@ -119,14 +119,14 @@ def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
 
 
 def _bodies(question: FreeQuestion) -> tuple[Scene, tuple[ContactPair, ...]]:
-    # The robot among what it can meet, and which of these can meet.
+    # Return the robot among the bodies that it can touch, and the pairs of bodies that can touch.
     robot = question.problem.robot
     scene = question.scene or default_scene(robot)
     return scene, contact_pairs(robot, scene)
 
 
 def _deflected(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
-    # Motions that are deflected along some of their segments (s,).
+    # Return motions that are deflected along some of their segments (s,).
     (along, about), chords = coordinates(tasks.robot.pattern), tasks.ends[0, :, 1] - tasks.ends[0, :, 0]
     lengths = np.maximum(np.linalg.norm(chords[:, : len(along)], axis=1), NEAR * float(spool_radius(tasks.robot)))
     second_derivative = (
@@ -143,7 +143,7 @@ def _deflected(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterat
 def _parted(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, minimum: dict[int, float], near: float
 ) -> tuple[Tasks, Unknowns]:
-    # Planes about a motion where clearances are below `near`, m, by the clearances that pairs of bodies keep, m.
+    # Return planes about a motion where clearances are below `near`, m, so that pairs of bodies keep given clearances.
     (scene, pairs), radius = _bodies(question), float(spool_radius(tasks.robot))
     samples = tasks.basis.evaluate(tasks.controls(unknowns))[..., 0, :]
     linear = [_linear(tasks, samples, _gap(question, scene, pairs[k])) for k in minimum]
@@ -158,7 +158,7 @@ def _parted(
 
 
 def _linear(tasks: Tasks, samples: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
-    # Clearances (l, s, m, n), m, and their gradients (l, s, m, n, d) by the coordinates; NaN where bodies are not near.
+    # Return clearances (l, s, m, n), m, and their gradients (l, s, m, n, d) by the coordinates; NaN for bodies apart.
     def values(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         quaternions = quaternions_of(tasks, points)
         flat = points.reshape(-1, points.shape[-1])
@@ -185,7 +185,7 @@ def _gap(question: FreeQuestion, scene: Scene, pair: ContactPair) -> _Gap:
         return _Gap(_between_lines(scene, k, other), True, 0.5 * float(scene.diameters[[k, other]].sum()))
     if kind == "platform" and scene.body is None:
         return _Gap(_over_face(question, scene, k), True, 0.0)
-    # A scene in which nothing else can meet.
+    # Return a scene in which only one pair can touch.
     cable = [max(k, 0)]
     alone = dataclasses.replace(
         scene,
@@ -201,20 +201,20 @@ def _gap(question: FreeQuestion, scene: Scene, pair: ContactPair) -> _Gap:
 
 
 def _rays(scene: Scene, k: int, positions: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    # From the spool to the platform, (n, 3).
+    # Return vectors from the spool to the attachment point on the platform, (n, 3).
     return positions + turns @ scene.platform_points[k] - scene.base_points[k]
 
 
 def _turns(positions: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
     if quaternions is None:
         return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
-    from scipy.spatial.transform import Rotation  # takes time, and few motions need it
+    from scipy.spatial.transform import Rotation  # slow to import, and few motions need it
 
     return Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
 
 
 def _between_lines(scene: Scene, k: int, other: int) -> Callable:
-    # Distance of the lines of two cables, with the sign of the volume, where they are nearest inside of both.
+    # Return the distance of the lines of two cables, signed by the volume, where they are nearest inside both cables.
     start = scene.base_points[other] - scene.base_points[k]
 
     def distance(positions: np.ndarray, quaternions: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -231,7 +231,7 @@ def _between_lines(scene: Scene, k: int, other: int) -> Callable:
 
 
 def _over_face(question: FreeQuestion, scene: Scene, k: int) -> Callable:
-    # Height of a spool over the platform's face, where the cable is over the sector of its corner.
+    # Return the height of a spool over the platform's face, if the cable is over the sector of its corner.
     sides, normal = (np.asarray(part) for part in bodies_of(question.problem.robot, scene).sectors)
     across = np.cross(normal, sides[k, 1]), -np.cross(normal, sides[k, 0])
 

@@ -23,17 +23,17 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.runtime.stages import stage
 from cspr_jax.verification.proved_answers import verify_all_robots
 
-# Weights of barriers, and softness, with which searches go on from a coarser motion.
+# Weights of barriers, and softness, of searches that start from the motion of a coarser search.
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Searches of all segments together, one after the other until one converges: divisor of the number of intervals, and
-# index of `FINE`. On fewer intervals a search gets stuck less often, and motions are some parts in a thousand slower.
+# Searches of all segments together, in order until one converges: divisor of the number of intervals, and index of
+# `FINE`. On fewer intervals a search gets stuck less often, but motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
-# Searches of single segments: divisor of the number of intervals, and softness. Each but the last is for segments whose
-# best motion only one start has led to so far; the last, on few intervals, for segments without a motion.
+# Searches of single segments: divisor of the number of intervals, and softness. All but the last are for segments whose
+# best motion only one start has led to so far; the last, on few intervals, is for segments without a motion.
 SEARCHES = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0))
-FEWEST = 3  # samples of each interval
+FEWEST = 3  # smallest number of samples of each interval
 SAME = 1e-3  # relative difference of durations within which two motions are the same
-# Fraction of the search time after which searches of single segments end, once each has a motion. The rest is for the
+# Searches of single segments end after this fraction of the search time, once each has a motion. The rest is for the
 # search of all segments together, and for tightening.
 ENOUGH = 0.5
 
@@ -47,9 +47,9 @@ class SegmentMotion(NamedTuple):
         controls: (K, d) control points.
         duration: s.
         cost: the objective; inf where no search has converged.
-        basis: of the control points.
-        is_shared: whether two starts or more have led to it.
-        start: index of the start that it was searched from.
+        basis: basis functions of the control points.
+        is_shared: whether two or more starts have led to it.
+        start: index of the start from which it was found.
     """
 
     controls: np.ndarray
@@ -67,18 +67,18 @@ class SegmentMotion(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class FreeMotion:
-    """The best motion that the search has come to.
+    """The best motion that the search has found.
 
     Fields:
-        motions: one per segment; if the search did not converge, those that it tried last.
-        answers: of them: proved, refuted or undecided.
-        energy: (n,) integral of the sum of the squares of the tensions, N^2 s, of the segments.
-        level: (n,) of the objective, as `objectives` has it.
+        motions: one per segment; if the search did not converge, those of its last step.
+        answers: answers of the motions: proved, refuted or undecided.
+        energy: (n,) integral of the sum of the squares of the tensions over each segment, N^2 s.
+        level: (n,) level of the objective, as `objectives` defines it.
         is_optimal: whether the search met all limits at its samples.
-        is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
-        searched: duration of all segments before bounds were tightened, s; NaN without a motion.
-        parts: best motions along the segments by themselves.
-        families: (n,) family of each motion that stands in place of the search's own; None: all are the search's.
+        is_stopped: whether Ctrl-C, or `search_time`, ended the search early.
+        searched: duration of all segments before bounds are tightened, s; NaN without a motion.
+        parts: best motion along each segment by itself.
+        families: (n,) family of each motion that replaces the search's own; None: all are the search's own.
     """
 
     motions: list[Spline]
@@ -134,7 +134,7 @@ def free_motion(
 
 
 def _begun(question: FreeQuestion) -> list[SegmentMotion]:
-    # Starts of the search, as they are: no motion can be proved, so that none is searched for.
+    # Return the starts themselves: no motion can be proved, so none is searched for.
     single = segments_of(question.tasks(question.settings.intervals, FEWEST))
     begun = starts(single, question.poses.z0, 1)
     pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
@@ -147,10 +147,10 @@ def _searched(
     forms: Sequence[ClosedForm],
     lines: Sequence[ClosedForm],
 ) -> tuple[list[SegmentMotion], bool]:
-    # Return the best motion along each segment by itself, and whether the search has been stopped (Ctrl-C raises if
-    # there is no motion to keep). With closed forms, the first search starts from these instead of the usual starts.
+    # Return the best motion along each segment by itself, and whether the search was stopped (Ctrl-C raises if there is
+    # no motion to keep). With closed forms, the first search starts from these instead of the usual starts.
     settings, poses = question.settings, question.poses
-    # Motions from earlier searches have no start among these.
+    # Motions from earlier searches do not come from a start of this search.
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
     until, begin = settings.until, time.monotonic()
     enough = begin + ENOUGH * (until - begin)
@@ -185,7 +185,7 @@ def _starts(question: FreeQuestion, single: Tasks, chosen: np.ndarray, lines: Se
 
 
 def _said(best: dict[int, SegmentMotion], objective: str) -> str:
-    # The best so far, for people who wait.
+    # Announce the best motion so far to people who wait.
     if not best or not _all_optimal(best):
         return ""
     return f", so far {sum(one.duration for one in best.values()):.4g} s" if objective == "time" else ", one is there"
@@ -198,7 +198,7 @@ def _all_optimal(best: dict[int, SegmentMotion]) -> bool:
 def _keep(
     best: dict[int, SegmentMotion], segments: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima
 ) -> None:
-    # Keep the better motions. Those that two starts have led to are marked, also if these belong to two searches.
+    # Keep the better motions; mark those that two starts have led to, even if in different searches.
     controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
     is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
     costs = np.where(is_optimal, costs, np.inf)
@@ -222,7 +222,7 @@ def _keep(
 
 
 def _together(tasks: Tasks, best: list[SegmentMotion], barrier: float) -> Unknowns:
-    # The motions along all segments as the start of a search for all together.
+    # Start the search for all segments together from the motions along each.
     averages, duration = tasks.basis.averages, np.array([[one.duration for one in best]])
     values = [BSpline(one.basis.knots, one.controls, DEGREE)(averages) for one in best]
     return started(tasks, np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(values))[None], duration, barrier)

@@ -1,4 +1,4 @@
-"""Leg of free motions: poses joined by the fastest motions that are found between them."""
+"""Leg of free motions: poses joined by the fastest motions that a search finds."""
 
 import dataclasses
 import time
@@ -39,7 +39,7 @@ DIVIDED = (
 )
 FOLLOWED = 'the search found nothing faster than family = "{}", whose motions these are'
 LINES = 'the search found nothing faster than a line in its least time, as of family = "{}", which leads to {}{}'
-# Accelerations jump where they change at once by more than this fraction of the largest one.
+# Accelerations count as jumping where they change at once by more than this fraction of the largest one.
 JUMPING, JUMP = "; accelerations jump along it", 0.01
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
@@ -49,10 +49,10 @@ class FreeAnswers(Answers):
     """Answers of free motions.
 
     Fields:
-        objective: row of `objectives.OBJECTIVES`.
+        objective: the row of `objectives.OBJECTIVES`.
         energy: (n,) integral of the sum of the squares of the tensions, N^2 s.
-        lower_bound: (n,) of the time of all motions between both poses, s; NaN for none.
-        source: (n,) family whose motion it is.
+        lower_bound: (n,) lower bound of the time of all motions between both poses, s; NaN for none.
+        source: (n,) family that each motion comes from.
     """
 
     objective: str
@@ -61,7 +61,7 @@ class FreeAnswers(Answers):
     source: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """The objective, and the lower bound of the time of any motion; see `Answers.details`."""
+        """The objective, and a lower bound of the time of all motions; see `Answers.details`."""
         details = super().details(i) | {"objective": self.objective, "energy": float(self.energy[i])}
         details["source"] = str(self.source[i])
         bound = float(self.lower_bound[i])
@@ -72,7 +72,7 @@ class FreeAnswers(Answers):
 
 
 class FreeMotions(Leg):
-    """Poses joined by the fastest motions that are found between them; see `Leg`."""
+    """Poses joined by the fastest motions that a search finds; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families, and accelerations that do not fit the poses."""
@@ -97,7 +97,7 @@ class FreeMotions(Leg):
             raise ConfigError(waypoints.path, f"duration_max is missing: longest duration of a segment, s, {why}")
 
     def begin_with(self, others: Sequence[Leg]) -> None:
-        """Begin searches from motions of other families, too; see `Leg.begin_with`."""
+        """Let searches also start from motions of other families; see `Leg.begin_with`."""
         self._others, self._lines = (
             [leg for leg in others if FAMILIES[leg.waypoints.family].precedes_searches is first]
             for first in (False, True)
@@ -110,7 +110,7 @@ class FreeMotions(Leg):
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)
-        # If all accelerations are given, segments can be searched one by one.
+        # If all accelerations at poses are given, segments can be searched one by one.
         is_separate = waypoints.plan_file.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
@@ -151,7 +151,7 @@ class FreeMotions(Leg):
         raise ConfigError(self.waypoints.path, f"{key}: {allowed}: {cause.text}")
 
     def _said(self, sources: list[str | None], motions: list[Spline]) -> list[str]:
-        # Lines of text that say which motions are those of other families; only lines replace single segments.
+        # Return lines that say which motions are from other families; only straight lines replace single segments.
         lines = []
         for family in dict.fromkeys(source for source in sources if source):
             indices = [i for i, source in enumerate(sources) if source == family]
@@ -166,13 +166,13 @@ class FreeMotions(Leg):
 
     @property
     def _settings(self) -> FreeSettings:
-        # The search time counts from here.
+        # The search time counts from now on.
         spec = self.waypoints.plan_file
         until = np.inf if spec.search_time is None else time.monotonic() + spec.search_time
         return FreeSettings(spec.objective or "time", spec.duration_max, spec.starts, until)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """A search that came to nothing, or was stopped; see `Leg.warnings`."""
+        """Warn of a search that found nothing or was stopped; see `Leg.warnings`."""
         return self._notes
 
     def _together(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
@@ -180,7 +180,7 @@ class FreeMotions(Leg):
         return [self._no_slower(problem, scene, poses, poses, lines, others)]
 
     def _separate(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
-        # Each segment begins with the acceleration with which the one before ends, except after lines, where it jumps.
+        # Each segment starts with the acceleration at the end of the previous one, except after lines, where it jumps.
         parts, accelerations = list[FreeMotion](), poses.accelerations.copy()
         lines, others = (cache(partial(closed_forms, legs, problem, poses)) for legs in (self._lines, self._others))
         for i in range(len(self)):
@@ -208,7 +208,7 @@ class FreeMotions(Leg):
         lines: Callable[[], list[ClosedForm]],
         others: Callable[[], list[ClosedForm]],
     ) -> FreeMotion:
-        # Lines are there first, since they take little time. Other families are asked only where they can help.
+        # Compute lines first, since they take little time; compute other families only where they can help.
         settings = self._settings
         if len(divided(problem, poses)):
             return free_motion(problem, scene, poses, settings)
@@ -239,7 +239,7 @@ class FreeMotions(Leg):
         free: FreeMotion,
         forms: list[ClosedForm],
     ) -> FreeMotion:
-        # Search from other families' motions, too, and take these where it finds nothing faster.
+        # Search from other families' motions as well, and use these motions where nothing faster is found.
         is_proved = bool(free.answers.feasible.all())
         if any(not is_proved or form.duration.sum() < free.duration for form in forms):
             further = free_motion(problem, scene, poses, settings, free, forms)
@@ -247,7 +247,7 @@ class FreeMotions(Leg):
         return no_slower(free, problem, scene, poses, settings, forms)
 
     def _poses(self, problem: Problem, z0: float) -> FreePoses:
-        # The poses in the axes of the kernels.
+        # Return the poses in the axes of the kernels.
         waypoints = self.waypoints
         positions, quaternions = np.asarray(waypoints.points(z0)), None
         if isinstance(problem.robot, PlatformRobot):

@@ -21,7 +21,7 @@ from cspr_jax.verification.proved_answers import answers_of, proofs_of, verify_a
 
 
 class FreeMap(ProvedMap):
-    """The least duration that a search finds of all motions to each target; see `GridMap`."""
+    """The least duration that a search finds among all motions to each target; see `GridMap`."""
 
     from_rest = True
 
@@ -85,7 +85,7 @@ class FreeMap(ProvedMap):
                 columns[name][reached] = column
 
     def _at_rest(self, positions: np.ndarray) -> Answers:
-        # A motion at rest for one second at each position.
+        # Return motions that stay at rest for one second at each position.
         motions = [
             Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), self._turning())
             for position in positions

@@ -1,7 +1,7 @@
-"""Search for the fastest motions of many pairs of poses on few intervals, from few starts and from neighbours' motions.
+"""Search for the fastest motions of many pairs of poses on few intervals, from few starts and neighbours' motions.
 
-Where a neighbour is much faster, or where nothing is found, the neighbour's motion is moved to the pair's own poses,
-and a search begins from it.
+If a neighbouring pair has a much faster motion, or a pair has none, the neighbour's motion is moved to the pair's own
+poses, and a new search starts from it.
 """
 
 from collections.abc import Sequence
@@ -13,19 +13,19 @@ from cspr_jax.families.free.search.interior_point import BARRIERS, optima, start
 from cspr_jax.families.free.search.starts import starts
 from cspr_jax.families.free.search.tasks import Tasks
 
-# Indices of the starts from which searches begin: a line, and swings of one arc and of two.
+# Indices of the first starts: a line, and swings of one arc and of two.
 FIRST = (0, 1, 3)
-# Weight of the barriers, and softness, of a search from a start, and from a neighbour's motion.
+# Weight of the barriers, and softness, of a search from one of the starts, and of one from a neighbour's motion.
 FROM_START, FROM_NEIGHBOUR = (BARRIERS[0], 10.0), (1e-2, 1.0)
-NEAR = 8  # neighbours of a pair
-VISITS = 2  # rounds in which neighbours can help
-# A neighbour's motion is tried if it is faster by this fraction, plus the distance of the poses over their length.
+NEAR = 8  # number of neighbours of a pair
+VISITS = 2  # number of rounds of searches from neighbours' motions
+# A neighbour's motion is tried if it is faster by this fraction plus the relative distance of the poses.
 FASTER = 0.02
-RATIO = 2.0  # largest ratio of lengths by which times are scaled
+RATIO = 2.0  # largest ratio of lengths for which durations are scaled
 
 
 class Neighbours:
-    """The best motions that are found between pairs of poses.
+    """The best motions found so far between pairs of poses.
 
     Fields:
         controls: (n, K, d) control points.
@@ -33,7 +33,7 @@ class Neighbours:
     """
 
     def __init__(self, tasks: Tasks, depths: Sequence[float]) -> None:
-        """Begin without motions."""
+        """Start without motions."""
         self._tasks, self._depths, count = tasks, depths, len(depths)
         self.controls = np.zeros((count, tasks.basis.controls, tasks.ends.shape[-1]))
         self.duration = np.full(count, np.inf)
@@ -48,11 +48,11 @@ class Neighbours:
 
     @property
     def lacking(self) -> np.ndarray:
-        """Indices of the pairs for which nothing is found."""
+        """Indices of the pairs without a motion."""
         return np.flatnonzero(~np.isfinite(self.duration))
 
     def search(self) -> None:
-        """Search from the first starts, from neighbours, and where nothing is found from the other starts."""
+        """Search from the first starts, from neighbours' motions, then, where no motion is found, from all starts."""
         self._from_starts(np.arange(len(self.duration)), others=False)
         self._from_neighbours()
         if len(self.lacking):
@@ -65,7 +65,7 @@ class Neighbours:
         self._improve(np.repeat(pairs, len(chosen)), controls, duration, FROM_START)
 
     def _improve(self, pairs: np.ndarray, controls: np.ndarray, duration: np.ndarray, how: tuple[float, float]) -> None:
-        # Search from motions, of which a pair may have none or several.
+        # Search from motions; a pair may have none or several of them.
         tasks = self._tasks.take(pairs)
         result = optima(tasks, started(tasks, controls[:, None], duration[:, None], how[0]), *how)
         times = np.where(result.is_optimal, result.unknowns.duration[:, 0], np.inf)
@@ -80,7 +80,7 @@ class Neighbours:
         ratio = np.clip(self._lengths[pairs] / np.maximum(self._lengths[others], 1e-9), 1.0 / RATIO, RATIO)
         fraction = 1.0 + FASTER + self._distance / longest
         for _ in range(VISITS):
-            # Each motion is tried only once.
+            # Try each motion only once.
             expected = self.duration[others] * np.sqrt(ratio)
             helps = (expected * fraction < self.duration[pairs]) & (self.duration[others] < self._tried)
             best = np.full(len(self.duration), np.inf)
@@ -93,7 +93,7 @@ class Neighbours:
             self._improve(pairs[chosen], self._moved(others[chosen], pairs[chosen]), expected[chosen], FROM_NEIGHBOUR)
 
     def _moved(self, source: np.ndarray, to: np.ndarray) -> np.ndarray:
-        # Motions of some pairs, moved to the poses of others.
+        # Return motions of some pairs, moved to the poses of others.
         tau = self._tasks.basis.averages[:, None]
         fraction = 3.0 * tau**2 - 2.0 * tau**3
         shift = self._tasks.ends[to, 0] - self._tasks.ends[source, 0]

@@ -1,7 +1,7 @@
-"""Motions of other families in place of what a search finds, where they are faster, or it finds nothing.
+"""Motions of other families that replace those of a search where they are faster, or the search finds nothing.
 
-Splines follow these motions, and equal them at the poses. Their orientations are splines of quaternions: a platform
-may turn by more than half a turn from the orientation in the middle, where Rodrigues vectors go to infinity.
+Splines approximate these motions, and equal them at the poses. Orientations are splines of quaternions, since a
+platform may turn by more than half a turn from its mean orientation, where Rodrigues vectors become infinite.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BATCH = 128
 
 
 def followed(tasks: Tasks, motions: list[Motion], duration: Float[np.ndarray, "s"], z0: float) -> list[Spline]:
-    """Splines of a task that follow motions."""
+    """Splines of a task that approximate motions."""
     along, about = coordinates(tasks.robot.pattern)
     samples = [np.asarray(states_at(motion, tasks.basis.averages).position)[:, along] for motion in motions]
     controls = np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(samples))
@@ -59,7 +59,7 @@ def followed(tasks: Tasks, motions: list[Motion], duration: Float[np.ndarray, "s
 
 
 def _orientation_pieces(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.ndarray:
-    # Bernstein coefficients (m, 6, 4) of quaternions that do not jump to their negatives.
+    # Return Bernstein coefficients (m, 6, 4) of quaternions that keep their sign.
     basis, (along, about) = tasks.basis, coordinates(tasks.robot.pattern)
     quaternions = np.array(states_at(motion, basis.averages).quaternion)
     turns_over = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
@@ -80,7 +80,7 @@ def _orientation_pieces(tasks: Tasks, segment: int, motion: Motion, duration: fl
 
 
 def energy_along(tasks: Tasks, motion: Motion) -> float:
-    """Integral of the sum of the squares of the tensions."""
+    """Integral of the sum of the squares of the tensions over a motion."""
     kernel = partial(_tensions, tasks.robot, tasks.limits, common_shape(motion))
     force = in_batches(kernel, tasks.basis.tau.ravel(), batch_size=BATCH)
     return float(motion.duration()) * float(np.sum(tasks.basis.weights.ravel() * np.sum(force**2, axis=1)))
@@ -91,12 +91,12 @@ def _tensions(robot: AnyRobot, limits: Limits, motion: Motion, tau: Array) -> Ar
     return jax.vmap(lambda one: tensions(robot, motion.state(one), limits))(tau)
 
 
-# Intervals per half swing of a spline that follows a closed form, and how often they are doubled.
+# Intervals per half swing of a spline that approximates a closed form, and how often they are doubled.
 INTERVALS, DOUBLINGS = 16, 3
 
 
 def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
-    """Tell whether closed forms may be better than a motion: if it takes longer than the swings it started from."""
+    """Tell whether closed forms may be better: the motion is not feasible, or slower than swings."""
     if not free.answers.feasible.all():
         return True
     return settings.objective == "time" and free.duration > ARCS * len(free.motions) * half_swing(problem, poses)
@@ -110,7 +110,7 @@ def no_slower(
     settings: FreeSettings,
     forms: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """A motion that is at most as slow as closed forms through the same poses."""
+    """The motion, or that of a closed form through the same poses where it is faster."""
     is_proved = bool(free.answers.feasible.all())
     for form in sorted(forms, key=lambda one: float(one.duration.sum())):
         full = float(form.duration.sum())
@@ -126,7 +126,7 @@ def no_slower(
 def _followed(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
 ) -> FreeMotion | None:
-    # Double the intervals of the spline until it is proved; at the poses it has the accelerations of the closed form.
+    # Double the intervals of the spline until it is proved; at the poses it has the closed form's accelerations.
     question = FreeQuestion.of(problem, scene, poses, settings)
     arcs = float(form.duration.max()) / half_swing(problem, poses)
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
@@ -144,7 +144,7 @@ def _followed(
 def lines_instead(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
 ) -> FreeMotion:
-    """Lines in place of a search that was stopped without a result."""
+    """Lines that replace a search which was stopped without a result."""
     motions, answers = cast(list[Spline], line.motions), cast(Answers, line.answers)
     energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
     families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
@@ -159,7 +159,7 @@ def no_slower_than_lines(
     settings: FreeSettings,
     lines: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """A motion with lines for those of its segments that are slower than a line, or not feasible where a line is."""
+    """The motion, with lines for segments that are slower than a line, or not feasible where a line is."""
     for line in lines:
         is_better = ~free.answers.feasible
         if settings.objective == "time":
@@ -171,7 +171,7 @@ def no_slower_than_lines(
 
 
 def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion:
-    # The segments of a motion, some of them along lines.
+    # Replace some segments of a motion by lines.
     chosen, count = set(indices.tolist()), len(free.motions)
     motions = [(line if k in chosen else free).motions[k] for k in range(count)]
     families = tuple(line.families[k] if k in chosen else (free.families or [None] * count)[k] for k in range(count))
@@ -182,13 +182,13 @@ def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion
 
 
 def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Bool[np.ndarray, "n"]:
-    """Tell whether lines are proved, short enough, and have the accelerations that the poses prescribe."""
+    """Tell which lines are proved, short enough, and have the accelerations that the poses prescribe."""
     is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
     return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
 
 
 def _accelerations_missed(line: ClosedForm, poses: FreePoses) -> np.ndarray:
-    # Largest differences from the prescribed accelerations, (n,) m/s^2 or rad/s^2.
+    # Return the largest differences from the prescribed accelerations, (n,) m/s^2 or rad/s^2.
     missed = np.zeros(len(line.motions))
     for k, motion in enumerate(line.motions):
         state, requested = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]

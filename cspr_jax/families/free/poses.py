@@ -1,4 +1,4 @@
-"""Poses between which free motions are sought, as tasks of the search, and motions from what it finds."""
+"""Poses between which a free motion is searched for, as tasks of the search, and motions from its results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.statics.wrench_balance import at_rest
 from cspr_jax.verification.criteria import pose_conditions
 
-# Along a segment the determinant, and the depth below the spools, stay above this fraction of the smaller end value.
+# Along a segment, determinant and depth below the spools stay above these fractions of the smaller value at its ends.
 REGULAR, SHALLOW = 1e-2, 0.5
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -37,12 +37,12 @@ class FreePoses(NamedTuple):
     """Poses through which a motion goes, in the axes of the kernels.
 
     Fields:
-        positions: (k, 3) of the mass centre, m.
+        positions: (k, 3) positions of the mass centre, m.
         quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
-        velocities: (k, 3) m/s; platforms do not turn.
-        accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations behind them, rad/s^2; a row with a
-            NaN leaves them free.
-        z0: depth of P0, m; motions from which searches start swing about P0.
+        velocities: (k, 3) m/s; angular velocities are zero.
+        accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations last, rad/s^2; a row with NaN is
+            free.
+        z0: depth of P0, m; searches start from swings about P0.
     """
 
     positions: np.ndarray
@@ -53,7 +53,7 @@ class FreePoses(NamedTuple):
 
 
 class _Joined(NamedTuple):
-    # Segments in coordinates: ends and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations
+    # Segments in coordinates: ends and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), and accelerations
     # (s + 1, d).
     ends: np.ndarray
     velocities: np.ndarray
@@ -63,7 +63,7 @@ class _Joined(NamedTuple):
 
 
 def check_searched(problem: Problem) -> None:
-    """Refuse a problem for which no free motion is sought."""
+    """Refuse problems for which the search cannot find free motions."""
     robot, maximum = problem.robot, problem.limits.tension_max
     pattern = PATTERNS[robot.pattern]
     if pattern.is_jointed or pattern.along_line:
@@ -84,7 +84,7 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
         return _Joined(ends, velocities, references, turns, linear)
     start, end = poses.quaternions[:-1], poses.quaternions[1:]
     end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
-    # From the middle between both, a Rodrigues vector is no longer than 1.
+    # Relative to the mean of both orientations, Rodrigues vectors are not longer than 1.
     references = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
     for side, quaternions in enumerate((start, end)):
         turning = products(quaternions, references * BACK)
@@ -117,7 +117,7 @@ def half_swing(problem: Problem, poses: FreePoses) -> float:
 def divided(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "n 3"]:
     """Segments whose ends lie on opposite sides of singular poses.
 
-    Every motion between them passes a singular pose, where the cables cannot carry every wrench, and cannot be proved.
+    A motion between them must pass a singular pose, where the cables cannot balance every wrench, so it has no proof.
     """
     if not pose_conditions(problem.robot)[0]:
         return np.zeros((0, 3))
@@ -127,22 +127,22 @@ def divided(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "n 3"]:
 
 
 def _sides(values: np.ndarray, part: float, cap: float = np.inf) -> np.ndarray:
-    # Bounds (2, s) of a value that is zero at singular poses, from its values (k,) at the poses: along a segment it
-    # keeps the sign of both ends, and at least `part` of the smaller magnitude, or `cap` if that is less.
+    # Return bounds (2, s) of a value that is zero at singular poses, from its values (k,) at the poses: along a segment
+    # it keeps the sign of both ends, and at least `part` of the smaller magnitude, or `cap` if that is less.
     ends = np.stack([values[:-1], values[1:]])
     minimum = np.minimum(part * np.abs(ends).min(0), cap)
     return np.stack([np.where((ends > 0.0).all(0), minimum, -np.inf), np.where((ends < 0.0).all(0), -minimum, np.inf)])
 
 
 def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:
-    # Depths (k,) of the poses below the plane of the spools, over the robot's radius.
+    # Return the depths (k,) of the poses below the spool plane, over the robot's radius.
     return poses.positions @ np.asarray(plane_normal(problem.robot)) / float(spool_radius(problem.robot))
 
 
 def tasks_of(
     problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
 ) -> Tasks:
-    """The task of moving through all poses."""
+    """The task of a motion through all poses."""
     ends, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
     shape = 1, len(ends), *basis.tau.shape, len(bounds.low)

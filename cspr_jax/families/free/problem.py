@@ -1,4 +1,4 @@
-"""The question of a search: poses, limits, and what the motion is to be the best in; bounds tighten after a proof."""
+"""Question of a search: poses, limits and objective; and how its bounds are tightened after a proof."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
 
-LEFT = 1e-7  # slack that a proof must find, in the units of values
-STEP = 1e-6  # by which bounds tighten at least
-MAX_PART = 0.03  # by which bounds tighten at most, over half their range or 1, whichever is larger
-BESIDE = 0.5  # tightening of the neighbouring pieces, over that of the piece
-MORE = 1.5  # tightening over the slack that is missing
-PATIENCE = 4  # rounds after which the factor is a growing power of `MORE`, since some motions change in every round
-SAMPLES = 4, 8  # of each interval, of point masses and of platforms, whose tensions change more between two of them
+LEFT = 1e-7  # smallest slack that a proof must find, in the units of values
+STEP = 1e-6  # smallest change of a bound that is tightened
+MAX_PART = 0.03  # largest change of a bound, over the larger of half its range and 1
+BESIDE = 0.5  # change on neighbouring pieces over the change on the piece
+MORE = 1.5  # change of a bound over the missing slack
+PATIENCE = 4  # after these rounds the factor is a growing power of `MORE`, as some motions keep changing
+SAMPLES = 4, 8  # samples of each interval: for point masses, and for platforms, whose tensions vary more
 
 
 class FreeSettings(NamedTuple):
@@ -33,11 +33,11 @@ class FreeSettings(NamedTuple):
 
     Fields:
         objective: row of `objectives.OBJECTIVES`.
-        longest: duration of a segment, s; None for any.
-        starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
-        until: time of `time.monotonic` at which all searches end, s.
-        intervals: of the spline of a segment, even.
-        samples: of each interval at which limits are kept; None for those of `SAMPLES`.
+        longest: longest duration of a segment, s; None for any.
+        starts: number of motions from which the search for a segment starts; None: all of `starts.starts`.
+        until: time at which all searches end, as of `time.monotonic`, s.
+        intervals: number of intervals of the spline of a segment, even.
+        samples: number of samples of each interval at which limits are kept; None: as in `SAMPLES`.
     """
 
     objective: str = "time"
@@ -49,13 +49,13 @@ class FreeSettings(NamedTuple):
 
 
 def planned_problem(problem: Problem) -> Problem:
-    """A problem without uncertainty."""
+    """The problem without uncertainty."""
     return problem._replace(limits=dataclasses.replace(problem.limits, uncertainty=None))
 
 
 @dataclasses.dataclass(frozen=True)
 class FreeQuestion:
-    """Question of a search: the best motion through poses within limits.
+    """Question of a search: which motion through poses within limits is the best?
 
     Fields:
         limits: bounds of the values at each sample.
@@ -79,7 +79,7 @@ class FreeQuestion:
 
     @property
     def is_planned(self) -> bool:
-        """Tell whether it is about the planned robot alone, and not about all within an uncertainty."""
+        """Tell whether it is about the planned robot alone, not about all robots within an uncertainty."""
         return self.problem.limits.uncertainty is None
 
     @property
@@ -89,18 +89,18 @@ class FreeQuestion:
 
     @property
     def samples(self) -> int:
-        """Samples of each interval at which limits are kept in the end."""
+        """Number of samples of each interval at which the final motion keeps limits."""
         turns = len(coordinates(self.problem.robot.pattern)[1]) > 0
         return self.settings.samples or SAMPLES[turns]
 
     def tasks(self, intervals: int, samples: int) -> Tasks:
-        """The question on some intervals."""
+        """The question as a task on some number of intervals."""
         numbers = basis(intervals, samples)
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
 def more(number: int) -> float:
-    """How much bounds tighten in a round, over what is missed."""
+    """Change of a bound in a round, over the missing slack."""
     return MORE ** max(1, number - PATIENCE + 1)
 
 
@@ -111,7 +111,7 @@ def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
 
 
 def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number: int) -> Tasks | None:
-    """Tighter bounds where the proof finds less slack than is needed."""
+    """Tasks with tighter bounds where the proof finds too little slack; None where it finds enough everywhere."""
     limits = question.limits
     changes = np.abs(limits.rises) + np.abs(limits.falls)
     unit = changes.max(1)
@@ -123,7 +123,7 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
     steps = np.where(
         missed > 0.0, np.minimum(more(number) * missed + STEP, MAX_PART * range_of_values), 0.0
     ) / np.where(unit > 0.0, unit, 1.0)
-    # A slack that is smallest near the end of a piece depends as much on the bounds of the next piece.
+    # A slack that is smallest near an end of a piece depends as much on the bounds of the neighbouring piece.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
     near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])

@@ -1,4 +1,4 @@
-"""Motions that a search has found, tightened until they are proved: for the planned robot, or for all like it."""
+"""Motions from a search, tightened until they are proved: for the planned robot, or for all within an uncertainty."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -16,11 +16,11 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.verification.piece_slacks import PieceSlacks
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Rounds of proof and tightening, and earlier rounds that leave slack for all robots.
+# Largest number of rounds of proof and tightening, and of earlier rounds that leave slack for all robots.
 ROUNDS, WIDER = 10, 3
-# Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
+# Weights of barriers, and softness, of searches that start from a motion within tighter bounds.
 ON = ((1e-5, 1e-2), (1e-4, 1e-1), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
-# Fraction of an uncertainty for which a motion is sought first if none is found for the whole.
+# If no motion is found for the full uncertainty, one for this fraction of it is searched for first.
 PART = 0.5
 
 
@@ -28,11 +28,11 @@ class FreeProof(NamedTuple):
     """A motion with its proof.
 
     Fields:
-        tasks: one, with the bounds within which the motion is the best one.
-        unknowns: of it.
+        tasks: the task, with the bounds within which the motion is the best one.
+        unknowns: unknowns of the motion.
         motions: one per segment.
-        answers: of the motions, for the planned robot alone.
-        is_stopped: whether Ctrl-C, or its time, has ended the search.
+        answers: answers of the motions, for the planned robot alone.
+        is_stopped: whether Ctrl-C, or its time limit, ended the search.
     """
 
     tasks: Tasks
@@ -52,7 +52,7 @@ def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]], 
 
 
 def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optimal: bool = True) -> FreeProof:
-    """A motion that is tightened until the limits of a question are proved."""
+    """A motion with its proof, tightened until the proof meets the limits of a question."""
     planned, is_stopped = question.planned, False
     for number in range(1, ROUNDS + 1):
         stage(f"free motion: proof {number}")
@@ -81,14 +81,14 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
 def _tighter(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
 ) -> tuple[Tasks, Unknowns] | None:
-    # The task within tighter bounds, and the motion as one of it; None where the proof finds enough slack everywhere.
+    # Return the task within tighter bounds and the motion as its unknowns; None if the proof finds enough slack.
     tighter = tightened(question, tasks, slacks, number)
     parted = separated(question, tighter or tasks, unknowns, slacks, number) if question.is_planned else None
     return parted or (None if tighter is None else (tighter, unknowns))
 
 
 def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Tasks, Unknowns] | None:
-    # The best motion within other bounds, from one found before; None where they leave nothing between them.
+    # Search within other bounds from a motion found before; return None if the bounds contradict each other.
     low, high = tasks.bounds(unknowns.level)
     if not (low < high).all():
         return None
@@ -100,7 +100,7 @@ def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Ta
 def robust_proof(
     question: FreeQuestion, uncertainty: Uncertainty, tasks: Tasks, unknowns: Unknowns
 ) -> FreeProof | None:
-    """The best motion for all robots within an uncertainty, searched from that of the planned robot."""
+    """The best motion for all robots within an uncertainty; the search starts from that of the planned robot."""
     all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
     try:
         full = _with_slack(all_robots, tasks, tasks, unknowns)
@@ -116,7 +116,7 @@ def robust_proof(
 def _with_slack(
     question: FreeQuestion, nominal: Tasks, tasks: Tasks, unknowns: Unknowns
 ) -> tuple[Tasks, Unknowns] | None:
-    # The best motion with slack for all robots beside the bounds of the planned one, from one found before.
+    # Search from a motion found before for the best one that leaves slack for all robots within the planned bounds.
     best = None
     for number in range(1, WIDER + 1):
         stage(f"free motion: room for all robots {number}")

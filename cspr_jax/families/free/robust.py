@@ -1,8 +1,8 @@
 """Bounds of a search that leave slack for all robots within an uncertainty.
 
-Tensions and speeds of cables of other robots differ from those of the planned one by amounts that depend little on the
-motion. So bounds of the planned robot tighten at each sample by the proved loss of slack along the motion found before;
-after a few rounds the losses are those of the motion itself.
+Tensions and cable speeds of other robots differ from those of the planned one by amounts that depend little on the
+motion. So bounds of the planned robot are tightened at each sample by the proved loss of slack along the motion found
+before; after a few rounds these losses are those of the resulting motion.
 
 Near the plane of the spools losses do depend on the motion: they grow as the inverse of the depth below the plane, and
 with the tensions themselves. Where they are a large fraction of the tensions, a point mass stays deeper.
@@ -22,13 +22,13 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import criteria
 from cspr_jax.verification.piece_slacks import all_robots_slacks, short_blocks
 
-# Multiple of an uncertainty for which the search leaves slack, so that blocks of the proof need not be very short.
+# The search leaves slack for this multiple of an uncertainty, so that blocks of the proof need not be very short.
 MULTIPLE = 1.02
-LARGEST = 0.5  # loss of a slack, at most, over half the range of the value that it bounds
-FRACTION = 0.25  # loss of a tension over the largest one, above which the motion must stay deeper below the spools
-DEEPER = 4.0  # factor by which depths grow in a round, at most
-ABOVE = 0.5  # largest depth that is asked for, over that of the poses
-# Tensions, and the depth on which their losses depend.
+LARGEST = 0.5  # largest loss of a slack, over half the range of the bounded value
+FRACTION = 0.25  # above this loss of a tension over the largest one, the motion must stay deeper
+DEEPER = 4.0  # largest factor by which depths grow in a round
+ABOVE = 0.5  # largest depth required, over that of the poses
+# Flags of tensions, and of the depth on which their losses depend.
 DEPENDING = Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS
 
 
@@ -45,7 +45,7 @@ def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: f
 
 
 def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Tasks:
-    """Bounds that leave slack for all robots within an uncertainty."""
+    """Tasks with bounds that leave slack for all robots within an uncertainty."""
     problem, limits, states = question.problem, question.limits, _states(tasks, motions)
     before, after = (all_robots_slacks(problem, states, multiple) for multiple in (0.0, 1.0))
     half, count = 0.5 * (limits.high - limits.low), before.shape[1]
@@ -64,7 +64,7 @@ def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Task
 
 
 def _states(tasks: Tasks, motions: list[Spline]) -> StateBounds:
-    # At all samples.
+    # Return bounds of the states at all samples.
     tau = tasks.basis.tau.ravel()
     durations = np.array([float(motion.knots[-1]) for motion in motions])
     ends = np.cumsum(durations)[:, None]
@@ -76,8 +76,8 @@ def _states(tasks: Tasks, motions: list[Spline]) -> StateBounds:
 def _depths(
     question: FreeQuestion, states: StateBounds, slacks: np.ndarray, lost: np.ndarray, samples: int
 ) -> np.ndarray | None:
-    # Lower bounds of the depth below the spools, among those of all values (k, n_values), from slacks and losses
-    # (k, n_criteria); `samples` is the number of samples of each segment.
+    # Return lower bounds of the depth below the spools in the columns of all values (k, n_values), from slacks and
+    # losses (k, n_criteria); `samples` is the number of samples of each segment. None if no depth is required.
     problem, limits = question.problem, question.limits
     all_criteria = criteria(problem.robot, problem.limits, question.scene)
     taut, below = ([k for k, criterion in enumerate(all_criteria) if criterion.flag == flag] for flag in DEPENDING)
@@ -86,7 +86,7 @@ def _depths(
     tensions = slacks[:, taut] + [all_criteria[k].allowed for k in taut]
     deeper = np.minimum(lost[:, taut].max(1) / (FRACTION * np.abs(tensions).max(1)), DEEPER)
     depth = np.asarray(states.position.middle) @ np.asarray(plane_normal(problem.robot))
-    # The poses stay where they are, so depths are limited by those of the ends.
+    # The poses are fixed, so the required depths may not exceed a fraction of theirs.
     of_segments = depth.reshape(-1, samples)
     ends = np.repeat(np.minimum(of_segments[:, 0], of_segments[:, -1]), samples)
     change = limits.rises[below].sum(0)

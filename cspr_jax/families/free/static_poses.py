@@ -1,4 +1,4 @@
-"""Poses that no motion can have, whatever leads to them: refused at once, and not searched for."""
+"""Poses that no motion can reach: refused before the search."""
 
 import dataclasses
 import functools
@@ -18,13 +18,13 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Criteria that depend on the position alone: if a pose breaks one, so does every motion to it. At rest all do so.
+# Criteria on positions: if a pose breaks one, so does every motion to it. A pose at rest must meet all criteria.
 _OF_POSITIONS = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
 OF_POSITIONS = functools.reduce(operator.or_, _OF_POSITIONS)
 
 
 def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame: Frame) -> tuple[int, Cause] | None:
-    """The first pose that no motion can have."""
+    """The first pose that no motion can reach, with the cause; None if there is none."""
     units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
     at_rest = [
         Spline(

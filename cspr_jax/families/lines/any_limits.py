@@ -1,8 +1,8 @@
 """Least duration along a straight line under any limits, by search over the ratio p / T.
 
-For one law every slack is affine in q = 1 / T^2, so that each sample bounds q from above, or, where the robot could
-not rest, from below. The largest q is searched for among samples, between which a parabola through three of them
-corrects each smallest bound; the ratio is searched for on finer and finer grids.
+For one law every slack is affine in q = 1 / T^2, so each sample bounds q from above or, where the robot could not rest,
+from below. The largest q is searched for among samples, where a parabola through three of them refines each smallest
+bound; the ratio is searched for on finer and finer grids.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensi
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.shapes import Float
 
-# Samples of a piece of the S-model, and of half of another law.
+# Number of samples of a piece of the S-model; a half of another law has twice as many.
 SAMPLES = 33
 HALF = 2 * SAMPLES
-# Ratios tried first, as logits; then, in each round, these fractions of the distance from the best one to its
-# neighbours.
+# Ratios tried first, as logits; each later round tries points at these fractions of the spacing about the best one.
+# `ROUNDS` is the number of rounds.
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
-# Fractions by which the duration of a search is made longer, one after the other, until it is proved.
+# A duration from the search is prolonged by these fractions, in order, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
-# The acceleration of a cable has a peak where the cable is short: samples lie on both sides of that point on the line,
-# at these distances over the shortest length.
+# The acceleration of a cable has a peak where the cable is shortest: samples lie on both sides of that point, at these
+# distances over the shortest length.
 BESIDE = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3)
-HALVINGS = 45  # that find the times of these samples
+HALVINGS = 45  # bisections for the times of these samples
 
 
 class Gain(NamedTuple):
     """Feasible q = 1 / T^2 of one law along a line.
 
     Fields:
-        high: () largest q, 1/s^2; not above 0 if there is none.
-        low: () smallest q, 1/s^2: 0 unless points are passed at which the robot could not rest.
-        up: number of the slack that bounds q in the first half: faces of taut cables come first, then the same faces as
-            smallest tensions shift them, then as largest tensions do, the other limits in their order, and last
-            the largest acceleration.
-        down: likewise in the second half.
+        high: () largest q, 1/s^2; not positive if there is none.
+        low: () smallest q, 1/s^2: 0 unless the line passes points at which the robot could not rest.
+        up: index of the slack that bounds q in the first half: first the faces of taut cables, then the same faces as
+            smallest tensions shift them, then as largest tensions do, then the other limits in order, and last the
+            largest acceleration.
+        down: index of the slack that bounds q in the second half.
     """
 
     high: Array
@@ -64,7 +64,7 @@ def gain(
     fraction = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
     tau = edges[:-1, None] + jnp.diff(edges)[:, None] * fraction[None]
     s, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
-    # At rest, and at q = 1: (2, n_pieces, n_samples, 1).
+    # States at rest and at q = 1: (2, n_pieces, n_samples, 1).
     both = jnp.asarray([0.0, 1.0])[:, None, None, None]
     states = LineStates(s[None], both * speed[None] ** 2, both * second_derivative[None])
     line = jax.tree.map(lambda x: x[None, None, None], line)
@@ -83,7 +83,7 @@ def gain(
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
-    # Samples of s'' miss its peak, for which the law has a formula.
+    # Samples of s'' miss its peak: take the peak from the law's formula.
     high = jnp.minimum(jnp.min(above), largest / law.largest[2])
     q_range = Gain(high, jnp.max(below), up, down)
     if "cable_acceleration_max" not in line.largest:
@@ -93,7 +93,7 @@ def gain(
 
 
 def _above(at_rest: Array, needed: Array, is_limited: Array) -> Array:
-    # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is at_rest - q needed.
+    # Return the largest q at samples (n_pieces, n_samples, n_rows) whose slack is at_rest - q needed.
     is_limited &= at_rest > 0.0
     fraction = _between(jnp.where(at_rest > 0.0, needed / jnp.where(at_rest > 0.0, at_rest, 1.0), 0.0), is_limited)
     above = jnp.where(fraction > 0.0, 1.0 / jnp.where(fraction > 0.0, fraction, 1.0), jnp.inf)
@@ -120,12 +120,12 @@ def _near_spools(
     at = LineStates(position, speed**2, second_derivative)
     line = jax.tree.map(lambda x: x[None, None], line)
     groups = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
-    # No parabolas between these samples, since knots of the law lie there.
+    # Use no parabolas between these samples, since knots of the law lie among them.
     return _above(jnp.ones_like(groups), 1.0 - groups, jnp.zeros_like(groups, bool)), tau[..., None]
 
 
 def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_peak: int) -> Gain:
-    # Add the peaks beside spools: they may bound q more, and then their limit is named for its half.
+    # Add the peaks beside spools: where they bound q more, name their limit as the one that binds.
     above, tau = peaks
     numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_peak, above.shape).ravel()
     sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]
@@ -137,7 +137,7 @@ def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], 
 
 
 def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:
-    # Number the slacks of each sample; a face that is shifted by tensions has another number.
+    # Number the slacks of each sample; a face has different numbers if tensions shift it.
     low, high = line.low[line.tightest][..., None, :], line.high[line.tightest][..., None, :]
     is_tensioned = tensions > 0.0
     by_largest = (is_tensioned & (tensions == high) & (low < high)).any(-1)[0]
@@ -149,8 +149,8 @@ def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array
 
 
 def _between(values: Array, is_limited: Array) -> Array:
-    # Samples (n_pieces, n_samples, n_rows) that are the largest of three, raised to the parabola's vertex. An end of a
-    # piece is raised where the parabola still rises from it.
+    # Raise samples (n_pieces, n_samples, n_rows) that are the largest of three to the vertex of their parabola, and
+    # ends of a piece if the parabola rises from them.
     a, b, c = values[:, :-2], values[:, 1:-1], values[:, 2:]
     three = is_limited[:, :-2] & is_limited[:, 1:-1] & is_limited[:, 2:]
     is_high, curvature = three & (b >= a) & (b >= c), 2.0 * b - a - c
@@ -162,7 +162,7 @@ def _between(values: Array, is_limited: Array) -> Array:
 
 
 def _from_end(values: Array, is_limited: Array) -> Array:
-    # Return the peak that the three samples at an end show, that end first; without a peak, the value at the end.
+    # Return the peak of the parabola through three samples from an end inwards; without a peak, the value at the end.
     a, b, c = (values[:, k] for k in range(3))
     derivative, curvature = 0.5 * (4.0 * b - 3.0 * a - c), 2.0 * b - a - c
     rises = is_limited & (derivative > 0.0) & (curvature > derivative)
@@ -192,7 +192,7 @@ def least_by_search(line: LineSlacks, largest: Float[Array, ""], law: Amplitude 
     width = logits[1] - logits[0]
 
     def finer(_, best):
-        # The points lie between the neighbours of the best one so far.
+        # The new points lie between the neighbours of the best one so far.
         center, width, _ = best
         points = center + width * jnp.asarray(FINER)
         costs, q_range = lax.map(cost, points)

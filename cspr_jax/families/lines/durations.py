@@ -1,4 +1,4 @@
-"""Durations of lines before their proof: by formulas where these hold, by search elsewhere."""
+"""Durations of lines before they are proved: by formulas where these hold, else by search."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cspr_jax.schema.limits import LIMITS
 
 BATCH, BATCH_OF_SEARCH = 4096, 16
 Rule = Literal["optimum", "thesis"]
-# Limits that depend on how the effector moves.
+# Names of limits on the motion of the effector, not on its position.
 MOVING = tuple(limit.name for limit in LIMITS if limit.of_motion)
 
 
@@ -38,12 +38,12 @@ class Durations:
     Fields:
         duration: T, s; not finite where there is no motion.
         ratio: p / T.
-        lower_bound: no motion along the line is faster, s; 0 where nothing is proved.
-        rest: smaller margin of rest of the two ends, m/s^2.
+        lower_bound: lower bound of the time of any motion along the line, s; 0 where none is proved.
+        rest: smaller margin of rest at the two ends, m/s^2.
         depth: smaller depth of the two ends below the plane of the spools, m; inf if the spools have no common plane.
         is_bounded: whether anything bounds the acceleration.
-        up: number of the bound that holds back the acceleration, in the order of `names_of`.
-        down: likewise of the braking.
+        up: index, in `names_of`, of the bound that limits the acceleration.
+        down: index of the bound that limits the braking.
     """
 
     duration: np.ndarray
@@ -66,7 +66,7 @@ class Durations:
 
 
 def moving(limits: Limits) -> tuple[str, ...]:
-    """Limits that depend on how the effector moves."""
+    """Names of the given limits on the motion of the effector, not on its position."""
     limit_names = [name for name in MOVING if getattr(limits, name) is not None]
     return tuple(name for name in limit_names if name != "tension_min" or np.asarray(limits.tension_min).any())
 
@@ -87,7 +87,7 @@ def by_formula(
     rule: Rule,
     max_acceleration: float,
 ) -> Durations:
-    """Least durations along straight lines under taut cables and the largest acceleration alone."""
+    """Least durations along straight lines if only taut cables and the largest acceleration limit them."""
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
     minimum, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), batch_size=BATCH)
@@ -102,14 +102,14 @@ def _lines(problem: Problem, arguments) -> LineSlacks:
 
 
 def lines_of(problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]) -> LineSlacks:
-    """Return the coefficients that slacks along lines depend on."""
+    """Coefficients of slacks along lines."""
     return in_batches(partial(_lines, problem), (starts, ends), batch_size=BATCH)
 
 
 def by_cells(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], max_acceleration: float
 ) -> Float[np.ndarray, "n"]:
-    """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too."""
+    """Lower bounds of the duration of any motion along lines, also under limits of tensions and cables."""
     largest = max_acceleration / np.linalg.norm(ends - starts, axis=1)
     return least_durations(lines_of(problem, starts, ends), largest)
 
@@ -123,7 +123,7 @@ def by_search(
     law: str,
     max_acceleration: float,
 ) -> Durations:
-    """Least durations along straight lines under any limits, of spools in any layout."""
+    """Least durations along straight lines under any limits, with spools in any layout."""
     moving_problem = problem._replace(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
     )
@@ -175,7 +175,7 @@ def _by_search(problem: Problem, arguments, *, law: str):
 
 
 def _bound_numbers(problem: Problem) -> np.ndarray:
-    # Return the number in `names_of` of each slack that can bound a search, see `any_limits.Gain`; faces have two
+    # Return the index in `names_of` of each slack that can bound a search, see `any_limits.Gain`; each face has two
     # sides.
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
     faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
@@ -186,5 +186,5 @@ def _bound_numbers(problem: Problem) -> np.ndarray:
         if name in limit_names:
             numbers.append(np.full(count, names.index(name)))
         elif name.startswith("tension"):
-            numbers.append(np.full(count, -1))  # no face is shifted by a tension without a limit
+            numbers.append(np.full(count, -1))  # a tension without a limit shifts no face
     return np.concatenate([*numbers, [names.index("max_acceleration")]])

@@ -1,10 +1,10 @@
 """Faces of the feasible accelerations along a straight line, as half-planes of path coordinate and path acceleration.
 
 On the line X0 + D s the normal to two cables' directions, times their lengths, is affine in s, and its product with D
-does not depend on s at all: n(s) . D = n(0) . D, since each of its changes is normal to D. So every face of the cone of
-feasible accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools.
-The product of n(s) with another cable's ray is affine too: a face bounds the cone where all these products are
-positive. If the spools lie in one plane, that is so everywhere below them or nowhere.
+does not depend on s: n(s) . D = n(0) . D, since each change of n is normal to D. So every face of the cone of feasible
+accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools. The
+product of n(s) with another cable's ray is affine too: a face bounds the cone where all these products are positive. If
+the spools lie in one plane, that holds either everywhere below them or nowhere.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from cspr_jax.robots.statics.wrench_sets import FLAT, normals_to, spanning
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class LineFaces:
-    """Half-planes steepness * s'' >= offset + offset_change * s in which a motion along a line stays.
+    """Half-planes steepness * s'' >= offset + offset_change * s that a motion along a line may not leave.
 
-    A slack over the length of the normal at s, normal + normal_change * s, is the distance of the acceleration from the
-    face.
+    A slack divided by the length of the normal at s, normal + normal_change * s, is the distance of the acceleration
+    from the face.
 
     Fields:
         steepness: (..., n_faces) n . D.
         offset: (..., n_faces) n . g at the start.
         offset_change: (..., n_faces) change of n . g from start to end.
-        normal: (..., n_faces, 3) n at the start, to the side of the other cables.
+        normal: (..., n_faces, 3) n at the start, towards the other cables.
         normal_change: (..., n_faces, 3) change of n from start to end.
-        along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 of rays in the face.
-        along_change: (..., n_faces, n_cables) its change from start to end.
-        first: (..., n_faces) s from which on it bounds the accelerations of taut cables.
-        last: (..., n_faces) s up to which it does; not above `first` if it bounds none.
+        along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 for rays in the face.
+        along_change: (..., n_faces, n_cables) change of `along` from start to end.
+        first: (..., n_faces) smallest s at which the face bounds the accelerations of taut cables.
+        last: (..., n_faces) largest such s; not above `first` if the face bounds none.
     """
 
     steepness: Array
@@ -59,7 +59,7 @@ class LineFaces:
 
 
 def _normals(robot: PointMassRobot, position: Array) -> tuple[Array, Array]:
-    # Return the normals to rays that keep their lengths, (n_choices, 3), and their products with the rays,
+    # Return the normals to rays, scaled with the lengths of the rays, (n_choices, 3), and their products with the rays,
     # (n_choices, n_cables).
     rays = robot.base_points - position[None]
     if robot.dof == PLANAR:
@@ -78,7 +78,7 @@ def line_faces(robot: PointMassRobot, start: Float[Array, "3"], end: Float[Array
     """Half-planes of a line between two points."""
     (normal, along), (at_end, along_end) = _normals(robot, start), _normals(robot, end)
     if in_plane:
-        # Which side the other cables are on is the same everywhere below the spools: seen from far enough below them.
+        # The other cables are on the same side of a face everywhere below the spools: find it far enough below them.
         _, seen = _normals(robot, jnp.zeros_like(start).at[2].set(spool_radius(robot)))
         above, below = (seen > 0.0).any(1), (seen < 0.0).any(1)
         side = jnp.where(above, 1.0, -1.0)[:, None]
@@ -103,7 +103,7 @@ def line_faces(robot: PointMassRobot, start: Float[Array, "3"], end: Float[Array
 
 
 def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
-    # Find the part of the line on which no product is negative and some are positive.
+    # Find the part of the line where no product is negative and some are positive.
     change = start - end
     crossing = start / jnp.where(change != 0.0, change, 1.0)
     first = jnp.max(jnp.where((start < 0.0) & (end > 0.0), crossing, 0.0), axis=1)
@@ -117,12 +117,12 @@ class Sides(NamedTuple):
     """Upper bounds of s'', as lines in s, and of -s'', as lines in 1 - s from the end of the line.
 
     Fields:
-        up: (..., n_faces + 1) largest s'' at the start; inf of a face that does not bound it.
-        up_change: (..., n_faces + 1) its change from start to end.
-        down: (..., n_faces + 1) largest -s'' at the end; inf likewise.
-        down_change: (..., n_faces + 1) its change from end to start.
-        first: (..., n_faces + 1) s from which on it holds.
-        last: (..., n_faces + 1) s up to which it holds.
+        up: (..., n_faces + 1) largest s'' at the start; inf if the face does not bound it.
+        up_change: (..., n_faces + 1) change of `up` from start to end.
+        down: (..., n_faces + 1) largest -s'' at the end; inf if the face does not bound it.
+        down_change: (..., n_faces + 1) change of `down` from end to start.
+        first: (..., n_faces + 1) smallest s at which the bound holds.
+        last: (..., n_faces + 1) largest s at which it holds.
     """
 
     up: Array
@@ -134,7 +134,7 @@ class Sides(NamedTuple):
 
 
 def sides(faces: LineFaces, largest: Float[Array, ""]) -> Sides:
-    """Bounds of the path acceleration; the last one of each side is that of the largest acceleration."""
+    """Bounds of the path acceleration; the last one on each side is the largest acceleration."""
     steep = faces.steepness
     is_up, is_down = faces.bounds & (steep < 0.0), faces.bounds & (steep > 0.0)
     over = jnp.where(is_up | is_down, steep, 1.0)

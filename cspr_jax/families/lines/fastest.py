@@ -1,4 +1,4 @@
-"""Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
+"""Fastest motions along straight lines with verdicts: by formulas, or by search where these motions break a limit."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts
 
-# Lines that a thread computes at a time, where there is something to search or to prove.
+# Number of lines that a thread computes at a time, if there is anything to search or to prove.
 PART = 256
 Table = TypeVar("Table", Durations, Verdicts)
-# Ends nearer to each other than this, over the largest coordinate of the spools, are the same position.
+# Ends count as one position if their distance is less than this fraction of the spools' largest coordinate.
 SAME_PLACE = 1e-12
-# Lines that pass a spool nearer than this, over that coordinate, go through it.
+# A line passes through a spool if its distance from it is less than this fraction of the same coordinate.
 THROUGH = 1e-9
-# Flags that rest at an end raises: no motion avoids `OF_POSITIONS` there, and no motion starts with `NO_MOTION`.
+# Flags of rest at an end: those of positions, which every motion raises, and those that exclude any motion.
 OF_POSITIONS = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
-# Duration from which on a motion counts as standing still, over the time of a fall by the robot's radius and the line.
+# A motion counts as standing still if it lasts this many times a fall by the robot's radius plus the line's length.
 STANDING = 1e4
-# Fractions of a duration below which the formulas lose the digits of these fractions.
+# Fractions of a duration below this have too few digits in the formulas.
 SHORT = 1e-6
 
 
@@ -43,8 +43,8 @@ class Fastest(NamedTuple):
     """Fastest motions along n lines, (n,) each.
 
     Fields:
-        durations: finite where there is a motion; 0 where both ends are one position.
-        verdicts: of the motions, or why there is none.
+        durations: finite where there is a motion; 0 where both ends are the same position.
+        verdicts: verdicts of the motions, or why there is no motion.
         moves: whether there is a motion between two positions.
     """
 
@@ -94,8 +94,8 @@ def _fastest(
     results, may_move, in_place = _at_rest(problem, starts, ends, timings)
     verdicts_of = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
-        # The durations of the formulas without limits need no proof, except where the digits of p or T - p are lost, or
-        # the peak of the acceleration may lie beyond its limit.
+        # Durations by formulas without limits need no proof, unless p or T - p has too few digits, or the peak of the
+        # acceleration may exceed its limit.
         is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
         is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
         indices = np.flatnonzero(
@@ -129,18 +129,18 @@ def _bound_accelerations(limits: Limits) -> bool:
 def _at_rest(
     problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations
 ) -> tuple[Verdicts, np.ndarray, np.ndarray]:
-    # Tell why there can be no motion, where there can be one, and where both ends keep the limits on positions.
+    # Return why there is no motion, where one is possible, and where both ends keep all limits at rest.
     doubt = FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
     scale = float(np.abs(np.asarray(problem.robot.base_points)).max())
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * scale
     above, slack = ~(timings.depth > 0.0), timings.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
-    # If cables are slack, limits of their tensions say nothing more.
+    # If cables are slack, limits of their tensions add no information.
     flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_POSITIONS)
     flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
     rests = (flags == 0) & (timings.rest > doubt)
     open_ended = np.where(timings.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
-    # With limits on positions alone the motion of the formulas is shown all the same.
+    # If only limits on positions fail, show the motion of the formulas nevertheless.
     no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
     may_move = ~above & (timings.rest > doubt) & ~is_same & timings.is_bounded & ((flags & no_motion) == 0)
     verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(FLAGS)
@@ -166,8 +166,8 @@ def _without_motion(
     timings: Durations,
     before: np.ndarray,
 ) -> np.ndarray:
-    # Return the flags of lines along which a search finds no motion: those of a motion that is nearly at rest, else
-    # those of the motion by formulas.
+    # Return the flags of lines along which a search finds no motion: those of an almost static motion, else those of
+    # the motion by formulas.
     flags, open_lines = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
     if len(open_lines):
         long = np.linalg.norm(ends - starts, axis=1) + float(spool_radius(problem.robot))
@@ -182,7 +182,7 @@ def _without_motion(
 def _proved(
     verdicts_of: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, timings: Durations, before: np.ndarray
 ) -> tuple[Durations, Verdicts]:
-    # Make the durations of a search longer until they are proved; without a motion, the flags from before stand.
+    # Prolong durations from a search until they are proved; lines without a motion keep their earlier flags.
     nothing = np.full(len(starts), np.nan)
     flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
     results = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))

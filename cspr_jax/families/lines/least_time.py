@@ -1,8 +1,8 @@
-"""Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
+"""Least durations along straight lines from rest to rest: from arrays of ends to arrays of results.
 
-If all spools lie in one plane and there are no limits, the motions that the formulas of the S-model give are feasible
-by proof: the bounds of every face are met all along (see `families.lines.s_model`), with a margin above rounding.
-Otherwise, and where p or T - p is so short that its digits are lost, every motion has a proof of its own.
+If all spools lie in one plane and there are no limits, motions by the formulas of the S-model need no proof: they meet
+the bounds of every face (see `families.lines.s_model`) with a margin above rounding. Otherwise, and where p or T - p is
+so short that its digits are lost, every motion is proved individually.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ class LeastTimes(Columns):
 
     Fields:
         verdict: flags of `Verdict`; 0 where there is a feasible motion.
-        duration: T, s; NaN where there is none, 0 where both ends are one position.
+        duration: T, s; NaN where there is none, 0 where both ends are the same position.
         acceleration_time: p, s.
-        least_duration: no motion along the line is faster, s.
+        least_duration: lower bound of the time of any motion along the line, s.
         duration_ratio: duration over least duration.
-        rest_margin: smaller margin of rest of the two ends, m/s^2; NaN where an end is not below the spools.
-        active_up: number of the bound that holds back the acceleration, from 1 on in the order of `names_of`; 0: none.
-        active_down: likewise of the braking.
-        names: of the bounds, in the order of their numbers.
+        rest_margin: smaller margin of rest at the two ends, m/s^2; NaN where an end is not below the spools.
+        active_up: number, from 1 in the order of `names`, of the bound that limits the acceleration; 0: none.
+        active_down: number of the bound that limits the braking; 0: none.
+        names: names of the bounds.
     """
 
     verdict: np.ndarray
@@ -59,7 +59,7 @@ def least_times(
     timings, results, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
     )
-    # A refuted motion has no duration; the duration is 0 s where both ends are one position.
+    # A refuted motion has no duration; the duration is 0 s where both ends are the same position.
     moves &= (results.verdict == 0) | (results.verdict == Verdict.UNDECIDED.value)
     nothing = np.where((results.verdict == 0) & ~moves, 0.0, np.nan)
     duration, minimum = (np.where(moves, x, nothing) for x in (timings.duration, timings.lower_bound))

@@ -1,4 +1,4 @@
-"""Leg of straight lines from rest to rest: the S-model, the quintic, the cubic."""
+"""Leg of straight lines from rest to rest, by the S-model, a quintic or a cubic."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class TimedLines(Leg):
         self._refuse("arcs")
 
     def check(self, problem: Problem) -> None:
-        """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
+        """Refuse the rule of the thesis if the spools are not in one plane; see `Leg.check`."""
         if self.waypoints.plan_file.rule == "thesis" and not in_one_plane(problem.robot):
             path, key = self.waypoints.robot_file.placed("base_points", self.waypoints.path)
             raise ConfigError(path, f'{key}: must lie in one plane with rule = "thesis"')
@@ -34,7 +34,7 @@ class TimedLines(Leg):
         return answers, list(motions_of(answers, starts, ends, law=self.waypoints.family))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
-        """Answers for many depths, on which they depend only by rests in P0; see `Leg.answers`."""
+        """Answers for many depths; they matter only for rests in P0; see `Leg.answers`."""
         return self._solved(problem, *self._ends(problem, depths))
 
     def _ends(self, problem: Problem, depths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

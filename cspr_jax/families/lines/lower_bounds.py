@@ -1,8 +1,8 @@
 """Lower bound of the duration of any motion along a straight line under limits of tensions and of cables.
 
-The line is cut into cells. Over each, faces, cable rates and their limits bound s'', -s'' and s' by constants from
-above, by interval arithmetic; nothing is faster than to accelerate at these bounds, keep the largest speed, and brake.
-The limit of the cables' accelerations restricts fast motions further; that is left out, which makes the bound lower.
+The line is divided into cells. Over each cell, interval arithmetic bounds s'', -s'' and s' from above by constants. No
+motion is faster than accelerating at these bounds, keeping the largest speed, and braking. Limits of cable
+accelerations restrict fast motions further; ignoring this only lowers the bound.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cspr_jax.numerics.bounds.interval_jets import Jet, lowest
 from cspr_jax.numerics.shapes import Float
 
 CELLS = 256
-# Numbers that are held together: cells by faces by cables.
+# Largest number of values in memory: cells times faces times cables.
 TOGETHER = 1 << 20
 
 
@@ -31,7 +31,7 @@ def _bounds(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
     up, down, speed = _constants(lines, edges)
     up, down = (np.minimum(x, largest[:, None]) for x in (up, down))
     width, cap = 1.0 / CELLS, 0.5 * speed**2
-    # Largest s'^2 / 2 at the edges: from the start, and from the end.
+    # Largest s'^2 / 2 at the edges of cells, as reached from the start and from the end.
     ahead, back = (_energies(*pair, width) for pair in ((up, cap), (down[:, ::-1], cap[:, ::-1])))
     energy = np.minimum(ahead, back[:, ::-1])
     with np.errstate(divide="ignore"):
@@ -53,7 +53,7 @@ def _energies(gain: np.ndarray, cap: np.ndarray, width: float) -> np.ndarray:
 
 
 def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Bounds of s'', -s'' and s' over the cells, (n, CELLS) each.
+    # Return upper bounds of s'', -s'' and s' over the cells, (n, CELLS) each.
     line = jax.tree.map(lambda x: x[:, None], lines)
     first, last = edges[None, :-1, None], edges[None, 1:, None]
     one, none = np.full_like(first, 1.0 / CELLS), np.zeros_like(first)
@@ -62,7 +62,7 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
     shortness = (away**2 * line.square[..., None] + line.squared_distance) ** -0.5
     by_faces = _face_bounds(line, lines.tightest, s, shortness)
     up, down = (np.where(sign * line.steepness < 0.0, by_faces, np.inf).min(-1) for sign in (1.0, -1.0))
-    # The rate of a cable over s' grows along the line.
+    # The rate of a cable over s' increases along the line.
     ends = [(x - line.nearest) * line.square[..., None] for x in (first, last)]
     rates = [
         x / np.sqrt((x / line.square[..., None]) ** 2 * line.square[..., None] + line.squared_distance) for x in ends
@@ -73,7 +73,7 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
         if "cable_speed_max" in line.largest:
             speed = (line.largest["cable_speed_max"] / minimum).min(-1)
         if "cable_acceleration_max" in line.largest:
-            # A cable that is paid out has l'' >= l_s s'', one that is wound in has l'' >= |l_s| (-s'').
+            # A cable that lengthens has l'' >= l_s s'', one that shortens has l'' >= |l_s| (-s'').
             maximum = line.largest["cable_acceleration_max"] / minimum
             up = np.minimum(up, np.where(rates[0] > 0.0, maximum, np.inf).min(-1))
             down = np.minimum(down, np.where(rates[1] < 0.0, maximum, np.inf).min(-1))
@@ -86,7 +86,7 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _face_bounds(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
-    # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces): inf if the face bounds nothing there.
+    # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces); inf if the face bounds nothing there.
     first, last = s.value
     free = [line.offset + line.offset_change * x for x in (first, last)]
     along = (s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2)

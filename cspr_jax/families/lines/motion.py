@@ -1,8 +1,8 @@
 """Straight lines from rest to rest, by a law of time: the S-model, the quintic and the cubic.
 
-The law s(tau) runs from 0 to 1 and is a piecewise polynomial, an `Amplitude` like those of chapter 2. Of the S-model
-(Boralugoda, Tables 3.1 and 3.2, their last range mended) the acceleration is a triangle up for the first part of the
-time, p / T, and one down for the rest. The quintic's acceleration is smooth, the cubic's jumps at both ends.
+The law s(tau) runs from 0 to 1 and is a piecewise polynomial, an `Amplitude` like those of chapter 2. In the S-model
+(Boralugoda, Tables 3.1 and 3.2, their last range corrected) the acceleration is a triangle upwards during the fraction
+p / T of the time, then a triangle downwards. With the quintic it is smooth, with the cubic it jumps at both ends.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
 
-# Blocks of which bounds are computed at a time.
+# Number of blocks whose bounds are computed at a time.
 BATCH = 64
 LAWS = ("s-curve", "quintic", "cubic")
 
@@ -34,7 +34,7 @@ def s_curve(ratio: Float[Array, ""]) -> Amplitude:
     ratio = jnp.asarray(ratio, float)
     rest, zero, one = 1.0 - ratio, jnp.zeros_like(ratio), jnp.ones_like(ratio)
     up, down = 4.0 / (3.0 * ratio**2), 4.0 / (3.0 * rest**2)
-    # The pieces are expanded about the start, the fastest time from either side, and the end.
+    # Expand the pieces about the start, about the time of largest speed from either side, and about the end.
     pieces = [
         [zero, zero, zero, up],
         [ratio, 2.0 * one, zero, -up],
@@ -54,7 +54,7 @@ def s_curve(ratio: Float[Array, ""]) -> Amplitude:
 
 
 def fixed_law(name: str) -> Amplitude:
-    """Law that has no parameter."""
+    """Law without a parameter."""
     return amplitudes.named("quintic") if name == "quintic" else amplitudes.from_polynomial([0.0, 0.0, 3.0, -2.0])
 
 
@@ -73,7 +73,7 @@ class TimedLine:
     Fields:
         start: (3,) from the centroid of the spools, z down, m.
         direction: (3,) from the start to the end, m.
-        law: s(tau).
+        law: the law s(tau).
         time: () duration T, s.
     """
 

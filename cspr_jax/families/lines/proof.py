@@ -1,9 +1,9 @@
-"""Smallest slacks of motions along straight lines, with a proof.
+"""Smallest slacks of motions along straight lines, with proved bounds.
 
 Between knots a law of time is a polynomial, and slacks are smooth functions of it, except where the tensions that
-accelerate least change: one choice of tensions, kept over a block, bounds the slack from below. Slacks are computed at
-both ends of a block, and a bound of the second derivative by interval arithmetic says how far below their chord a slack
-can lie. Blocks whose bound lies below a slack that is attained elsewhere are halved until the two agree.
+accelerate least change. Any fixed choice of tensions over a block bounds the slack from below. Slacks are computed at
+both ends of a block; a bound of the second derivative by interval arithmetic shows how far a slack can lie below its
+chord. Blocks whose bound is below a slack attained elsewhere are halved until the two agree.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from cspr_jax.numerics.polynomials import bounds, derivatives, over
 from cspr_jax.numerics.search.block_minima import MinimumBlocks, Proved, smallest
 from cspr_jax.numerics.shapes import Float
 
-# Numbers that are held together: blocks by faces by cables.
+# Largest number of values in memory: blocks times faces times cables.
 TOGETHER = 1 << 20
 
 
 def smallest_slacks(
     lines: LineSlacks, laws: Amplitude, durations: Float[np.ndarray, "n"], gravity: float, *, enough: float = math.inf
 ) -> Proved:
-    """Smallest slacks along lines."""
+    """Smallest slacks along lines, with their bounds."""
     scales = np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     batch = max(TOGETHER // max(lines.along[0].size, 1), 1)
 
@@ -38,7 +38,7 @@ def smallest_slacks(
 
 
 def _first(laws: Amplitude) -> MinimumBlocks:
-    # One block a piece, about its origin.
+    # Start with one block per piece, relative to its origin.
     count, pieces = laws.origins.shape
     ends = np.zeros((count, 1)), np.asarray(laws.knots, float), np.ones((count, 1))
     edges = np.concatenate(ends, axis=1)
@@ -49,8 +49,7 @@ def _first(laws: Amplitude) -> MinimumBlocks:
 def _of_blocks(
     lines: LineSlacks, laws: Amplitude, durations: np.ndarray, blocks: MinimumBlocks
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Bound each group from below over each block, and find the smaller one of its values at both ends,
-    # (n, n_groups) each.
+    # Bound each group from below over each block, and find its smaller value at the two ends, (n, n_groups) each.
     block_lines = jax.tree.map(lambda x: x[blocks.case], lines)
     s = over(np.asarray(laws.coefficients)[blocks.case, blocks.piece], blocks.start, blocks.width)
     per_time = (1.0 / (blocks.width * durations[blocks.case]))[:, None]

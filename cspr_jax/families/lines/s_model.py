@@ -1,10 +1,10 @@
-"""Least duration of the S-model along a straight line, and of any motion along it.
+"""Least duration of the S-model along a straight line, and of any motion along the line.
 
 With the ratio r = p / T the S-model has s = r S(x) and s'' = A(x) / (r T^2) while it accelerates, x from 0 to 1, with
-A = 8 x and S = 4/3 x^3 up to the middle. A bound s'' <= b + m s is met while 1 / T^2 <= min of r (b + m r S) / A over
-x, which has a closed form; braking is the same from the end with 1 - r. The first grows with r and the second falls,
-so that 1 / T^2 is largest where they meet. Whatever the law, nothing is faster than to accelerate at the bound and
-then to brake at it.
+A = 8 x and S = 4/3 x^3 up to the middle. It meets a bound s'' <= b + m s if 1 / T^2 <= min of r (b + m r S) / A over x,
+which has a closed form; braking is the same, seen from the end, with 1 - r. The first expression grows with r and the
+second falls, so 1 / T^2 is largest where they are equal. For all laws, no motion is faster than accelerating at the
+bound and then braking at it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from cspr_jax.numerics.search.minima import Bracket, golden_step, inner_points
 from cspr_jax.numerics.shapes import Float
 
 ROUNDS = 24
-SAMPLES = 128  # of half a motion by a law without a parameter
-SECTIONS = 48  # golden sections between two samples
-# Fraction by which a least duration is made longer, so that its margin is above rounding.
+SAMPLES = 128  # samples of half a motion by a law without a parameter
+SECTIONS = 48  # number of golden sections between two samples
+# A least duration is prolonged by this fraction, so that its margin is above rounding.
 LONGER = 1e-8
 
 
 def _gain(ratio: Array, start: Array, change: Array, touching: bool) -> Array:
-    # The largest 1 / T^2 of one half of the S-model under each bound, (n,).
+    # Return the largest 1 / T^2 of one half of the S-model under each bound, (n,).
     corner = 0.25 * ratio * (start + change * ratio / 6.0)
     if not touching:
         return corner
-    # A rising bound may touch the curve before its corner, at x < 1/2.
+    # A rising bound may touch the acceleration before its corner, at x < 1/2.
     rising = (change > 0.0) & (3.0 * start < change * ratio)
     x = jnp.cbrt(jnp.where(rising, 3.0 * start / (8.0 * jnp.where(rising, change * ratio, 1.0)), 0.125))
     return jnp.where(rising, 3.0 / 16.0 * ratio * start / jnp.where(x > 0.0, x, 1.0), corner)
@@ -45,8 +45,8 @@ class LeastDuration(NamedTuple):
     Fields:
         ratio: p / T.
         duration: T, s; inf where nothing is feasible.
-        up: number of the bound that holds the acceleration back.
-        down: number of the bound that holds the braking back.
+        up: index of the bound that limits the acceleration.
+        down: index of the bound that limits the braking.
     """
 
     ratio: Array
@@ -63,7 +63,7 @@ def least_s_curve(sides: Sides, *, touching: bool = True) -> LeastDuration:
         return up, _gain(1.0 - ratio, sides.down, sides.down_change, touching)
 
     def step(_, logit):
-        # Newton's method for log(up / down) over the logit of the ratio, in which it is nearly a line.
+        # Solve for the ratio by Newton's method on log(up / down) over its logit, which is nearly linear.
         ratio = jax.nn.sigmoid(logit)
         (up, down), (up_rate, down_rate) = jax.jvp(gains, (ratio,), (jnp.ones_like(ratio),))
         i, j = jnp.argmin(up), jnp.argmin(down)
@@ -79,10 +79,10 @@ def least_s_curve(sides: Sides, *, touching: bool = True) -> LeastDuration:
 
 
 def thesis_s_curve(sides: Sides) -> LeastDuration:
-    """The S-model by the rule of the text: both branches for Q3, the one with the smaller path coordinate."""
+    """The S-model by the rule of the thesis: of both branches for Q3, the one with the smaller path coordinate."""
     first = least_s_curve(sides, touching=False)
     start, change = sides.up[first.up], sides.up_change[first.up]
-    # 1 / T^2 on the line of Q3 alone is largest at r = -3 b / m.
+    # On the line of Q3 alone, 1 / T^2 is largest at r = -3 b / m.
     apex = jnp.where(change < 0.0, -3.0 * start / jnp.where(change < 0.0, change, 1.0), jnp.inf)
     ratio = jnp.where(apex < first.ratio, apex, first.ratio)
     gain = _gain(ratio, start, change, False)
@@ -91,7 +91,7 @@ def thesis_s_curve(sides: Sides) -> LeastDuration:
 
 
 def least_of_law(law: Amplitude, sides: Sides) -> LeastDuration:
-    """Least duration by a law without a parameter."""
+    """Least duration for a law without a parameter."""
     tau = jnp.linspace(0.0, 0.5, SAMPLES + 1)[1:-1]
 
     def smallest(start, change):
@@ -122,7 +122,7 @@ def least_of_law(law: Amplitude, sides: Sides) -> LeastDuration:
 
 def least_time(sides: Sides, *, everywhere: bool = True) -> Float[Array, ""]:
     """Least duration of any motion along a line from rest to rest: it accelerates at the bound, then brakes at it."""
-    braking = (sides.down + sides.down_change, -sides.down_change)  # over s
+    braking = (sides.down + sides.down_change, -sides.down_change)  # bound of -s'' as a function of s
     parts = [] if everywhere else [sides.first, sides.last]
     nodes = jnp.concatenate([_crossings(sides.up, sides.up_change), _crossings(*braking), *parts])
     x = jnp.sort(jnp.concatenate([jnp.array([0.0, 1.0]), nodes]))
@@ -139,14 +139,14 @@ def least_time(sides: Sides, *, everywhere: bool = True) -> Float[Array, ""]:
 
     gained = jnp.concatenate([jnp.zeros_like(x[:1]), jnp.cumsum(work(up, up_change))])
     lost = jnp.concatenate([jnp.cumsum(work(down, down_change)[::-1])[::-1], jnp.zeros_like(x[:1])])
-    # The switch lies in the first interval at whose end more is gained than can be lost.
+    # Braking starts in the first interval at whose end more energy is gained than braking can remove.
     i = jnp.clip(jnp.argmax(gained >= lost) - 1, 0, len(middle) - 1)
     linear = up[i] + down[i] + (up_change[i] + down_change[i]) * x[i]
     square, missing = 0.5 * (up_change[i] + down_change[i]), jnp.maximum(lost[i] - gained[i], 0.0)
     step = 2.0 * missing / (linear + jnp.sqrt(jnp.maximum(linear**2 + 4.0 * square * missing, 0.0)))
     switch = x[i] + step
     early = _time(jnp.minimum(x, switch), x, gained[:-1], up, up_change)
-    # Braking is seen from the end, so that speeds grow along it as well.
+    # Reverse braking in time, so that speeds increase along it as well.
     late = _time(
         1.0 - jnp.maximum(x, switch)[::-1],
         1.0 - x[::-1],
@@ -182,7 +182,7 @@ def _lowest(start: Array, change: Array, points: Array, holds: Array | None) -> 
 
 
 def _time(ends: Array, nodes: Array, energy: Array, start: Array, change: Array) -> Array:
-    # Sum of the times from node to node, up to the ends, of s'' = start + change * s with s'^2 / 2 = energy at the
+    # Return the total time from node to node, up to the ends, for s'' = start + change * s; `energy` is s'^2 / 2 at the
     # first node of each interval.
     low, high = ends[:-1], ends[1:]
 

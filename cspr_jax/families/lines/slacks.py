@@ -1,8 +1,8 @@
 """Slacks of taut cables and of limits along a straight line, as functions of s, s'^2 and s''.
 
-On the line a cable has the length l = sqrt(|D|^2 (s - c)^2 + h^2), the rate |D|^2 (s - c) / l times s', and a second
-derivative with h^2 / l^3. Every slack here is affine in s'^2 and s'', so that for one law it is affine in 1 / T^2. The
-formulas are written once: arrays go in where a motion is searched, interval jets where it is proved.
+On the line a cable has length l = sqrt(|D|^2 (s - c)^2 + h^2), rate |D|^2 (s - c) / l times s', and a second derivative
+with h^2 / l^3. Every slack here is affine in s'^2 and s'', so for one law it is affine in 1 / T^2. The formulas are
+written once: a search evaluates them on arrays, a proof on interval jets.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ TAUT = "taut"
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class LineSlacks:
-    """Coefficients that slacks along a line depend on.
+    """Coefficients of slacks along a line; those of faces are over the smallest norm of n on the line.
 
     Fields:
         square: () |D|^2, m^2.
-        nearest: (n_cables,) s at which each cable is shortest, beyond the ends too.
+        nearest: (n_cables,) s at which each cable would be shortest; it may lie beyond the ends.
         squared_distance: (n_cables,) square of its length there, m^2.
-        steepness: (n_faces,) n . D of the faces of both sides, over the smallest norm of n on the line.
-        offset: (n_faces,) n . g at the start, likewise; -inf of what bounds nothing.
-        offset_change: (n_faces,) change of n . g, likewise.
-        along: (n_faces, n_cables) n . r of the rays at the start, likewise.
-        along_change: (n_faces, n_cables) its change, likewise.
-        normal_change_square: (n_faces,) square of the norm of the change of n, likewise.
-        narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
-        smallest_square: (n_faces,) square of the norm of n there, likewise.
+        steepness: (n_faces,) n . D of the faces on both sides.
+        offset: (n_faces,) n . g at the start; -inf if the face bounds nothing.
+        offset_change: (n_faces,) change of n . g from start to end.
+        along: (n_faces, n_cables) n . r of the rays at the start.
+        along_change: (n_faces, n_cables) change of n . r from start to end.
+        normal_change_square: (n_faces,) square of the norm of the change of n.
+        narrowest: (n_faces,) s at which n would be smallest; it may lie beyond the ends.
+        smallest_square: (n_faces,) square of the norm of n there.
         spans: (n_faces,) whether the cables of the face span it.
-        low: smallest tensions over the mass by group of faces, (n_cables,) m/s^2 each.
-        high: likewise the largest, inf for none.
-        largest: of the limits that depend on how the effector moves, by name; (n_cables,) of cables, else (1,).
+        low: smallest tensions over the mass, by group of faces, (n_cables,) m/s^2 each.
+        high: largest tensions over the mass, by group of faces; inf for none.
+        largest: limits on the motion of the effector, by name; (n_cables,) for cables, else (1,).
     """
 
     square: Array
@@ -73,12 +73,12 @@ class LineSlacks:
 
     @property
     def tightest(self) -> str:
-        """Group of faces inside which all the others lie."""
+        """Group of faces that implies all other groups."""
         return [name for name in self.names if name in self.low][-1]
 
 
 def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3"]) -> LineSlacks:
-    """Return the coefficients that slacks along a line depend on."""
+    """Coefficients of slacks along a line."""
     robot, direction = problem.robot, end - start
     faces = line_faces(robot, start, end, in_plane=False)
     square = direction @ direction
@@ -119,7 +119,7 @@ def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3
 
 
 def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
-    # The group of the largest tension keeps the smallest tension too.
+    # The group of largest tensions includes smallest tensions.
     robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
     minimum, maximum = tension_range(robot, problem.limits)
     low, high = {TAUT: none}, {TAUT: none + jnp.inf}
@@ -131,7 +131,7 @@ def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
 
 
 class LineStates(NamedTuple):
-    """State of a motion along a line: arrays, or jets over blocks; their last dimension has length 1.
+    """State of a motion along a line, as arrays or as jets over blocks; the last dimension has length 1.
 
     Fields:
         s: path coordinate.
@@ -145,7 +145,7 @@ class LineStates(NamedTuple):
 
 
 def slacks(line: LineSlacks, name: str, at: LineStates, tensions: Any = None) -> Any:
-    """Slacks of a group in states, or a lower bound of them."""
+    """Slacks of a group at states; with fixed tensions, a lower bound of them."""
     if name == "speed_max":
         return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
     if name == "acceleration_max":
@@ -170,14 +170,14 @@ def slacks(line: LineSlacks, name: str, at: LineStates, tensions: Any = None) ->
 
 
 def _cable_acceleration(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
-    # Return the acceleration that the cables give towards the inside of each face.
+    # Return the acceleration that the cables cause towards the inside of each face.
     if isinstance(s, Jet):
         return ((s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2) * tensions).summed()
     return ((line.along + line.along_change * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
 
 
 def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
-    """Tensions within their limits that accelerate least towards the inside of each face."""
+    """Tensions within limits that accelerate least towards the inside of each face."""
     xp = np if isinstance(s, np.ndarray) else jnp
     low, high = line.low[name][..., None, :], line.high[name][..., None, :]
     along = line.along + line.along_change * s[..., None]
@@ -187,7 +187,7 @@ def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
 def tensions_over(
     line: LineSlacks, name: str, first: Float[np.ndarray, "n 1"], last: Float[np.ndarray, "n 1"]
 ) -> tuple[Float[np.ndarray, "n n_faces n_cables"], Bool[np.ndarray, "n n_faces"]]:
-    """One choice of tensions for all of a block, with which slacks are bounded from below."""
+    """One choice of tensions for a full block, which bounds slacks from below."""
     low, high = line.low[name][:, None, :], line.high[name][:, None, :]
     ends = [line.along + line.along_change * s[..., None] for s in (first, last)]
     endless = ~np.isfinite(high)
@@ -196,7 +196,7 @@ def tensions_over(
 
 
 def joined(first: Any, second: Any) -> Any:
-    """Slacks of two groups in one."""
+    """Slacks of two groups, joined."""
     if isinstance(first, Jet):
         return first.joined(second)
     xp = np if isinstance(first, np.ndarray) else jnp

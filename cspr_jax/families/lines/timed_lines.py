@@ -1,4 +1,4 @@
-"""Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
+"""Straight lines from rest to rest in the least time: from arrays of ends to answers."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from cspr_jax.numerics.shapes import Float
 
 @dataclasses.dataclass(frozen=True)
 class LineAnswers(Answers):
-    """Answers of straight lines, one each.
+    """Answers of straight lines.
 
     Fields:
         acceleration_time: (n,) p, s.
-        least_duration: (n,) no motion along the line is faster, s.
-        active: (n, 2) numbers, from 1 on, of the bounds that hold back the acceleration and the braking; 0: none.
-        names: of the bounds, in the order of their numbers.
+        least_duration: (n,) lower bound of the time of any motion along the line, s.
+        active: (n, 2) numbers, from 1, of the bounds that limit the acceleration and the braking; 0: none.
+        names: names of the bounds, in the order of their numbers.
     """
 
     acceleration_time: np.ndarray

@@ -1,4 +1,4 @@
-"""Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
+"""Verdicts of motions along straight lines: proved if all slacks have positive bounds, refuted by a negative slack."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def acceleration_slack(
     law: str,
     max_acceleration: float,
 ) -> Float[np.ndarray, "n"]:
-    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known."""
+    """Slack of the largest acceleration along lines, from the peak of s'' of each law in closed form."""
     largest = np.linalg.norm(ends - starts, axis=1) * largest_second_derivative(law, timings.ratio)
     with np.errstate(invalid="ignore", divide="ignore"):
         return 1.0 - largest / timings.duration**2 / max_acceleration
@@ -105,8 +105,8 @@ def _verdicts(
 
 
 def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Return smallest slacks, flags and doubts, (n,) each, of limits on positions, which the ends decide: lengths are
-    # convex in s, depths linear.
+    # Return smallest slacks, flags and doubts, (n,) each, for limits on positions. Only the ends matter, since lengths
+    # are convex in s, and depths are linear.
     robot, positions = problem.robot, np.stack([starts, ends], axis=1)
     lengths = np.linalg.norm(positions[:, :, None] - np.asarray(robot.base_points), axis=3)
     each: dict[str, Any] = {"depth": positions[..., 2:], "length": lengths}
@@ -126,7 +126,7 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
 def limits_at_rest(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
 ) -> Int[np.ndarray, "n"]:
-    """Limits that a robot at rest at either end breaks; limits that it only touches do not count."""
+    """Limits that a robot at rest at either end breaks; a limit that it only touches is not broken."""
     problem = touchable(problem)
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {
@@ -138,14 +138,14 @@ def limits_at_rest(
     alone = {name: fails({name: limit}) for name, limit in limits.items()}
     for limit_row in limits_set(problem.limits):
         flags |= np.where(alone.get(limit_row.name, False), limit_row.flag.value, 0)
-    if len(limits) > 1:  # of two limits that fail only together, the largest is named
+    if len(limits) > 1:  # if two limits fail only together, name the largest tension
         together = fails(limits) & ~np.any(list(alone.values()), axis=0)
         flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
     return flags
 
 
 def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
-    # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
+    # Tell whether rest at either end breaks limits of tensions, or needs slack cables, (n,).
     limited = problem._replace(limits=Limits(**limits))
     margins = [in_batches(partial(_at_rest, limited), positions, batch_size=BATCH) for positions in (starts, ends)]
     return np.min(margins, axis=0) < -FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))

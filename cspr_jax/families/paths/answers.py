@@ -1,4 +1,4 @@
-"""Answers of segments of paths: durations beside lower bounds, what binds, and where no motion passes."""
+"""Answers of segments of paths: durations beside lower bounds, what binds, and why no motion runs along a path."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 
-JUMP = 0.01  # change of an acceleration, over the largest one, above which it jumps
-DIGITS = 4  # of numbers in lines
-DECIMALS = 5  # of positions, m
-# Largest number of criteria that are named as binding.
+JUMP = 0.01  # an acceleration jumps if it changes by more than this fraction of the largest one
+DIGITS = 4  # digits of numbers in messages
+DECIMALS = 5  # decimals of positions in messages, m
+# Largest number of binding criteria that a message names.
 MOST_BINDING = 10
 # Flags of criteria that a slower motion may meet.
 OF_SPEED = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_motion), Verdict.WRENCH_INFEASIBLE)
@@ -35,10 +35,10 @@ class SectionAnswer(NamedTuple):
     """Section of a leg with its motion.
 
     Fields:
-        least: its motion.
+        least: the fastest motion along the section.
         segments: (n_cells,) index of the segment in which each cell lies.
-        ramp_time: of the plan, s.
-        before: number of segments of the plan before the leg.
+        ramp_time: time in which accelerations rise, as the plan gives it, s.
+        before: number of the plan's segments before the leg.
     """
 
     least: LeastTime
@@ -47,17 +47,17 @@ class SectionAnswer(NamedTuple):
     before: int = 0
 
     def times(self, segment: int) -> Float[np.ndarray, "n_cells"]:
-        """Times that its cells take in a segment."""
+        """Times that the motion takes in the cells of a segment; 0 in all other cells."""
         return np.where(self.segments == segment, np.diff(np.asarray(self.least.motion.knots)), 0.0)
 
     @property
     def ends(self) -> tuple[int, int]:
-        """Indices of the segments in which it begins and ends."""
+        """Indices of the segments in which the section starts and ends."""
         return int(self.segments[0]), int(self.segments[-1])
 
     @property
     def jumps(self) -> int:
-        """Number of times at which the acceleration jumps, those where it sets off from rest or stops included."""
+        """Number of times at which the acceleration jumps, including starts from rest and stops."""
         motion, width = self.least.motion, np.diff(np.asarray(self.least.motion.knots))
         points = np.asarray(motion.position)
         bends = np.linalg.norm(np.diff(points, 2, axis=1), axis=2) / width[:, None] ** 2
@@ -67,7 +67,7 @@ class SectionAnswer(NamedTuple):
         return len(motion.jumps(JUMP)) + int(at_ends.sum())
 
     def to_dict(self) -> dict[str, Any]:
-        """The section as a plan's JSON has it."""
+        """The section as the JSON of a plan has it."""
         minimum = self.least
         points = np.asarray(minimum.motion.position)
         nodes = np.concatenate([points[:, 0], points[-1:, -1]])
@@ -88,7 +88,7 @@ class SectionAnswer(NamedTuple):
 
 
 def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
-    # Tell what binds, the longest first, over cells that take these times.
+    # Return names of the criteria that bind, the longest binding first, in cells that take these times.
     fractions, total = dict[BindingName, float](), 0.0
     for minimum, times in parts:
         total += float(times.sum())
@@ -103,22 +103,22 @@ def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, An
 
 
 def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> Float[np.ndarray, "pieces"]:
-    """Feeds of the pieces of a segment's motion."""
+    """Largest speeds that the path itself allows on the pieces of a segment's motion."""
     return np.concatenate([section.least.feed[section.segments == segment] for section in sections])
 
 
 @dataclasses.dataclass(frozen=True)
 class PathCause(Cause):
-    """A point that no path speed passes, or an end whose speed is not possible.
+    """A point of a path that no path speed can pass, or an end at which the speed is not possible.
 
     Fields:
-        s: of the point, from the start of its section, m.
-        position: the point, in the axes of the robot file, m.
-        needs: whether the criterion needs the acceleration, and the other one forbids it.
-        against: flag and cable of the other one; None: the speeds from which the rest of the path can be run along.
-        end: "start" or "end" of the section, else "".
-        speeds: smallest and largest possible speed of such an end, m/s.
-        static_tension: tension that keeps the robot from standing still there; None: it can.
+        s: path coordinate of the point, from the start of its section, m.
+        position: (3,) the point, in the axes of the robot file, m.
+        needs: whether the criterion needs an acceleration that `against` forbids, and not vice versa.
+        against: flag and cable of the other criterion; None: the rest of the path, which limits the speed at the point.
+        end: "start" or "end" if the speed at this end of the section is not possible, else "".
+        speeds: smallest and largest possible speed at such an end, m/s.
+        static_tension: tension that prevents rest at the point; None if the robot can rest there.
     """
 
     s: float = math.nan
@@ -130,7 +130,7 @@ class PathCause(Cause):
     static_tension: StaticTension | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """The cause as a plan's JSON has it; see `Cause.to_dict`."""
+        """The cause as the JSON of a plan has it; see `Cause.to_dict`."""
         table = super().to_dict() | {"s": self.s, "position": list(self.position)}
         table["still"] = None if self.static_tension is None else self.static_tension.to_dict()
         if self.end:
@@ -140,7 +140,7 @@ class PathCause(Cause):
 
     @property
     def text(self) -> str:
-        """The cause in words, in one line."""
+        """The cause in one line of words."""
         position, static, line = _coordinates(self.position), self.static_tension, ""
         if static is not None:
             line = f"cannot stand still at ({_coordinates(static.position.tolist())}): {static.text}; "
@@ -177,13 +177,13 @@ class PathAnswers(Answers):
     """Answers of segments of paths.
 
     Fields:
-        sections: (n,) for each segment all sections that run through it.
+        sections: (n,) all sections that run through each segment.
     """
 
     sections: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """Bounds of the least time, what binds, and details of proofs; see `Answers.details`."""
+        """Bounds of the least time, binding criteria, and details of proofs; see `Answers.details`."""
         through = self.sections[i]
         is_whole = all(section.ends == (i, i) for section in through)
         bound = sum(section.least.lower_bound for section in through) if is_whole else math.nan
@@ -199,7 +199,7 @@ class PathAnswers(Answers):
         return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
 
     def notes(self, key: str = "path.ramp_time") -> list[str]:
-        """Say in one line where ramps are shorter than they are to be."""
+        """Warn in one line where ramps are shorter than requested."""
         sections = self.every_section()
         missing = [s for s in sections if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
         if not missing:
@@ -214,7 +214,7 @@ class PathAnswers(Answers):
         ]
 
     def causes_of(self, i: int, frame: Frame) -> tuple[Cause, ...]:
-        """Points that no path speed passes, then causes that no other speed removes; see `Answers.causes_of`."""
+        """Points that no path speed can pass, then causes that no other speed removes; see `Answers.causes_of`."""
         usual, causes, before = super().causes_of(i, frame), list[Cause](), 0.0
         for section in self.sections[i]:
             times, failure = section.times(i), section.least.failure
@@ -230,7 +230,7 @@ class PathAnswers(Answers):
 
 
 def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCause:
-    # An end whose speed is refused has the criterion of the slow motion.
+    # If the speed at an end is refused, name the criterion that the slow motion breaks.
     names = failure.names or ((Verdict[usual.criterion.upper()], None),)
     needs = names[0] is not None
     (criterion, cable), *others = [name for name in names if name is not None]

@@ -1,4 +1,4 @@
-"""Least times along many paths together."""
+"""Least times along many paths at a time."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ class PathTimes:
     """The fastest motions along n paths.
 
     Fields:
-        answers: verdicts and margins, proved.
+        answers: proved verdicts and margins.
         duration: (n,) s; inf where no motion is proved feasible.
-        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path, with the same stops,
-            s; NaN where none is known.
-        motions: over time, from the centroid of the spools; slow ones where none is feasible.
-        sections: (n,) for each path the motions along its sections.
+        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path with the same stops, s;
+            NaN if none is found.
+        motions: motions over time, from the centroid of the spools; slow ones where none is feasible.
+        sections: (n,) motions along the sections of each path.
     """
 
     answers: Answers

@@ -23,12 +23,12 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.proved_answers import proved_answers
 
-DEFLECTION = 0.1  # of lines, over their length
-RAMP_TIME = 0.05  # s; in which accelerations rise and fall where poses prescribe them; else they jump
+DEFLECTION = 0.1  # deflection of lines, over their length
+RAMP_TIME = 0.05  # s; accelerations ramp in this time if poses prescribe them, else they jump
 
 
 class FastestLines(Leg):
-    """Poses joined by the fastest of the lines that are proved: straight, or deflected to all sides; see `Leg`."""
+    """Poses joined by the fastest lines that are proved: straight, or deflected to all sides; see `Leg`."""
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
@@ -54,8 +54,8 @@ class FastestLines(Leg):
         return answers, motions
 
     def _lines(self, ends: np.ndarray, units: np.ndarray | None) -> list[Section]:
-        # Straight, then deflected: sections in the axes of the kernels between positions (2, 3) in those of the robot
-        # file.
+        # Return sections in the axes of the kernels, first the straight one, then deflected ones, from positions (2, 3)
+        # in the axes of the robot file.
         straight = path_through(PathTable(kind="line"), ends, units).sections()
         turning = None
         if units is not None:
@@ -72,7 +72,7 @@ class FastestLines(Leg):
 
 
 def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
-    # Lines along which a motion runs on a grid, the fastest first.
+    # Return the lines along which a motion runs on a grid, the fastest first.
     paths = discretes(problem, lines, [SectionSettings(MAP_GRID, 0.0)] * len(lines))
     runs = [motion.run for motion in jumping_motions(paths)]
     times = [
@@ -82,7 +82,7 @@ def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
 
 
 def _beside(ends: np.ndarray, dimensions: int) -> list[np.ndarray]:
-    # Points (3,) beside the middle of a line with two ends (2, 3), to both sides in a vertical plane and across it.
+    # Return points (3,) beside the middle of a line, given by its ends (2, 3), in its vertical plane and across it.
     along, middle = ends[1] - ends[0], ends.mean(0)
     length = float(np.linalg.norm(along))
     if length <= SAME_PLACE:

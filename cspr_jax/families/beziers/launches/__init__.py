@@ -1,9 +1,9 @@
-"""Launches by Bezier segments: the release, the choice among them, and maps of what can be hit.
+"""Launches from Bezier segments: the release, the choice of what a launch leaves open, and maps of landing points.
 
 Files, each importing only from those above it:
 
-    release            the segment through a release, and bounds within which one is searched for
-    launches           launches to a target, with a choice of what they leave open
+    release            the segment through a release, and bounds of the search for a release
+    launches           launches to a target, with a choice of what is left open
     launch_range       releases for many landing points
     launch_range_map   maps of launches
 """

@@ -1,7 +1,7 @@
 """Range of launches: for each landing point, the release and the Bezier segment from rest that reach it.
 
-Unknowns are the position of the release, the time of the flight, the duration of the segment, and when the object is
-released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
+Unknowns are the position of release, the time of flight, the duration of the segment, and the time of release on it.
+All else follows: the velocity of release (26), the control point and the end of the segment (29).
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS
 
 UNKNOWNS, POPULATION = 6, 64
-# Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
-# there, and proved later.
+# Margins that the launch of least speed must keep in the search. Those of taut cables are exact; those of limits are
+# only sampled in the search and proved later, so they are larger.
 EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
-# Landing points at a time where the answers are made.
+# Number of landing points whose answers are computed at a time.
 TOGETHER = 512
 
 
@@ -57,9 +57,9 @@ class Shot(NamedTuple):
     Fields:
         position: (3,) of the release, m.
         velocity: (3,) there, m/s.
-        flight_time: () s.
-        fraction: () time of the release over the duration of the segment.
-        motion: the segment.
+        flight_time: () time of flight, s.
+        fraction: () time of release over the duration of the segment.
+        motion: the segment on which the object is released.
     """
 
     position: Any
@@ -73,8 +73,8 @@ class Shot(NamedTuple):
 class LaunchRange(Releases):
     """Launches to n landing points by one Bezier segment each; see `Releases`.
 
-    A verdict of 0 says that the segment is proved feasible; else it is that of the segment with the largest margin
-    found, which does not say that there is no other. Margins are smallest slacks, of taut cables, depth and limits.
+    A verdict of 0 says that the segment is proved feasible. Any other verdict is that of the segment with the largest
+    margin found; it does not exclude other segments. Margins are the smallest slacks of taut cables, depth and limits.
 
     Fields:
         duration: (n,) of the segment, s.
@@ -97,7 +97,7 @@ def _shot(problem_and_bounds: tuple[Problem, ReleaseBounds], question: LaunchReq
 def _energy(
     problem_and_bounds: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array
 ) -> tuple[Array, Array]:
-    # Kinetic energy at the release over weight and radius of the robot, and the smallest margin.
+    # Return the kinetic energy at the release over weight and radius of the robot, and the smallest margin.
     robot, shot = problem_and_bounds[0].robot, _shot(problem_and_bounds, question, x)
     margins = margins_of(problem_and_bounds[0], jax.tree.map(lambda x: jnp.asarray(x)[None], shot.motion), SAMPLES)
     return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
@@ -129,7 +129,7 @@ def launch_range(
 def _answers(
     problem_and_bounds: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]
 ) -> LaunchRange:
-    # One candidate for every landing point and margin, in one array in which the margins change fastest.
+    # Make one candidate for every landing point and margin; the margin is the index that changes fastest.
     count, n_margins, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, n_margins, axis=0), cases[0])
     shots = in_batches(
@@ -160,7 +160,7 @@ def _answers(
 
 
 def _verdicts_and_margins(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    # Verdicts of motions in batches of one length, whatever is asked for.
+    # Verify motions in batches of one size, so that one program serves any number of them.
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
     results = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
     verdict = np.concatenate([x.verdict for x in results])

@@ -1,4 +1,4 @@
-"""Maps of launches: where an object can be thrown by one Bezier segment from a position."""
+"""Maps of launches: where one Bezier segment from a given position can throw an object."""
 
 from typing import Any
 

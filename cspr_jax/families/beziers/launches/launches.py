@@ -1,7 +1,7 @@
-"""Launches: the flight to a target, the segment on which an object is released, and the choice of what is left open.
+"""Launches: flight to a target, segment on which the object is released, and the choice of what is left open.
 
-The control point and the end of that segment follow from the position and the velocity of release, (29), and the
-accelerations of all the sequence from that control point.
+The position and the velocity of release determine the control point and the end of that segment, (29); from this
+control point follow the accelerations of the whole sequence.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from cspr_jax.launch.flight import aimed, flown
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.constrained_minima import constrained_minimum
 
-# Fractions of the duration of its segment between which a release is searched for.
+# A release is searched for between these fractions of the duration of its segment.
 EARLIEST, LATEST = 0.05, 0.95
 
 
@@ -26,12 +26,12 @@ class Launch(NamedTuple):
 
     Fields:
         points: (n + 1, 3) of the sequence, z down, m; the end of the launching segment is ignored.
-        segment: () number of the launching segment.
+        segment: () index of the launching segment.
         target: (3,) m.
-        point: (3,) position of the release, m; None: on the parabola of `velocity`.
-        velocity: (3,) at the target, m/s; None: as `point` and the time of flight demand.
-        time: () of the flight, s; None: to be chosen.
-        release: () time after the start of the segment, s; None: to be chosen.
+        point: (3,) position of release, m; None: it is on the parabola of `velocity`.
+        velocity: (3,) at the target, m/s; None: `point` and the time of flight determine it.
+        time: () time of flight, s; None: to be chosen.
+        release: () time of release since the start of the segment, s; None: to be chosen.
         z0: () depth at which slacks are normalised, m.
     """
 
@@ -49,10 +49,10 @@ class LaunchSequence(NamedTuple):
     """A launch and its sequence.
 
     Fields:
-        sequence: with the end of the launching segment.
+        sequence: the segments, with the end of the launching segment determined.
         durations: (n,) s.
-        release: () time after the start of the segment, s.
-        time: () of the flight, s.
+        release: () time of release since the start of the segment, s.
+        time: () time of flight, s.
         position: (3,) at the release, m.
         velocity: (3,) at the release, m/s.
     """
@@ -67,7 +67,7 @@ class LaunchSequence(NamedTuple):
 
 @jax.jit
 def _sequence_of(arguments: Any, x: Array) -> LaunchSequence:
-    # Unknowns: logarithms of the free durations, then the release, then the logarithm of the flight's time.
+    # Unknowns are logarithms of the free durations, the time of release, and the logarithm of the time of flight.
     problem, launch, durations, free = arguments
     times = durations.at[free].set(jnp.exp(x[: len(free)])) if len(free) else durations
     rest, at = x[len(free) :], launch.segment
@@ -95,7 +95,7 @@ def _total(arguments, x: Array) -> tuple[Array, Array]:
 
 
 def _speed(arguments, x: Array) -> tuple[Array, Array]:
-    # Square of the speed at the release, over gravity: kinetic energy over weight, m.
+    # Return the kinetic energy at the release over weight, as the squared speed over gravity, m.
     launch = _sequence_of(arguments, x)
     return 0.5 * jnp.sum(launch.velocity**2) / arguments[0].robot.gravity, _margins(arguments[0], launch)
 
@@ -107,7 +107,7 @@ def _landing(arguments, x: Array) -> tuple[Array, Array]:
 
 
 def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> LaunchSequence:
-    """The launch, with a choice of all that is left open."""
+    """The launch with all that it leaves open chosen."""
     launch = Launch(*(value if value is None else jnp.asarray(value) for value in launch))
     if choose == "energy":
         launch = launch._replace(time=jnp.asarray(_searched(problem, launch, durations, _speed).time))

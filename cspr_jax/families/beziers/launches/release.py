@@ -1,4 +1,4 @@
-"""Releases: the segment through one, and bounds within which one is searched for, in the units of the unknowns."""
+"""Releases: the segment through a release, and bounds of the search for one, in the units of its unknowns."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ def through(
     return middle, end
 
 
-# Fractions of the duration of the segment between which a release is searched for.
+# A release is searched for between these fractions of the duration of the segment.
 EARLIEST, LATEST = 0.01, 0.99
 
 
 class ReleaseBounds(NamedTuple):
     """Bounds of the unknowns.
 
-    These are the position of the release, m, the logarithms of the time of the flight and of the duration, s, and the
-    fraction of the duration.
+    Unknowns are the position of release, m, the logarithms of the time of flight and of the duration, s, and the time
+    of release as a fraction of the duration.
 
     Fields:
-        low: (6,) smallest values.
-        high: (6,) largest values.
+        low: (6,) lower bounds.
+        high: (6,) upper bounds.
     """
 
     low: Any

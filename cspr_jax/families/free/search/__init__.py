@@ -6,9 +6,9 @@ Files, each importing only from those above it:
     equations        equations and bounds of a motion at one time
     determinants     determinants of the wrenches of unit tensions, with derivatives
     derivatives      equations at many samples, with first and second derivatives
-    objectives       what a motion is the best in
-    tasks            motions that are sought together, and their unknowns
-    condensation     tensions and multipliers, condensed out of Newton's equations of each sample
+    objectives       what is minimised: time, energy, the largest tension, or minus the margin
+    tasks            motions that are searched for together, and their unknowns
+    condensation     tensions and multipliers, eliminated from Newton's equations of each sample
     newton           steps of Newton's method, with banded matrices
     points           motions with their equations during a search, and steps along which their merit falls
     interior_point   the interior-point method

@@ -12,9 +12,9 @@ from scipy.interpolate import BSpline
 from cspr_jax.numerics.shapes import Float
 
 DEGREE = 5
-# Control points that count in one interval.
+# Number of control points that determine the spline in one interval.
 LOCAL = DEGREE + 1
-# Weights of the first samples in an integral, over their distance.
+# Weights of the first samples in an integral, over the distance of samples.
 GREGORY = (3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0)
 
 
@@ -22,12 +22,12 @@ class Basis(NamedTuple):
     """Basis functions of splines with K control points on m intervals.
 
     Fields:
-        knots: (K + 6,) of normalised time.
+        knots: (K + 6,) knots of normalised time.
         tau: (m, n) samples of normalised time, equidistant, from start to end.
-        functions: (m, n, 3, 6) values and two derivatives there of the functions of an interval's control points.
-        averages: (K,) Greville abscissae: times at which control points count most.
-        fit: (K, K) control points from values at these times.
-        pieces: (m, 6, 6) Bernstein coefficients of each interval from its control points.
+        functions: (m, n, 3, 6) values and two derivatives at the samples of the functions that are nonzero there.
+        averages: (K,) Greville abscissae: times near which each control point has the largest weight.
+        fit: (K, K) matrix from values at these times to control points.
+        pieces: (m, 6, 6) matrices from control points to Bernstein coefficients of each interval.
     """
 
     knots: np.ndarray
@@ -44,12 +44,12 @@ class Basis(NamedTuple):
 
     @property
     def velocity_step(self) -> float:
-        """Step between the first two control points, over the first derivative at the start."""
+        """Distance of the first two control points, over the first derivative at the start."""
         return 1.0 / (DEGREE * len(self.tau))
 
     @property
     def acceleration_step(self) -> float:
-        """Step to the third control point that a second derivative at the start needs, over that derivative."""
+        """Shift of the third control point due to a second derivative at the start, over that derivative."""
         return 2.0 / (DEGREE * (DEGREE - 1) * len(self.tau) ** 2)
 
     @property
@@ -60,7 +60,7 @@ class Basis(NamedTuple):
         return values.reshape(self.tau.shape) / (self.tau.size - 1)
 
     def in_intervals(self, controls: np.ndarray) -> Float[np.ndarray, "... m 6 d"]:
-        """Control points that count in each interval."""
+        """Control points that determine the spline in each interval."""
         return np.stack([controls[..., m : m + LOCAL, :] for m in range(len(self.tau))], axis=-3)
 
     def evaluate(self, controls: np.ndarray) -> Float[np.ndarray, "... m n 3 d"]:
@@ -79,7 +79,7 @@ def basis(intervals: int, samples: int) -> Basis:
     derivatives = [spline.derivative(order)(tau) for order in range(3)]
     functions = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
     averages = np.array([knots[k + 1 : k + 1 + DEGREE].mean() for k in range(count)])
-    # Bernstein coefficients from values at six points of each interval.
+    # Return the matrix from values at six points of an interval to Bernstein coefficients.
     fraction = np.linspace(0.0, 1.0, LOCAL)[:, None]
     power = np.arange(LOCAL)
     bernstein = np.array([comb(DEGREE, k) for k in power]) * fraction**power * (1.0 - fraction) ** power[::-1]

@@ -1,10 +1,10 @@
-"""Newton's equations of single samples, from which values and multipliers are condensed.
+"""Newton's equations of single samples, from which values and multipliers are eliminated (condensed).
 
-With changes dx of the state, dv of the values and new multipliers y, and the weights W of the bounds,
+With changes dx of the state, changes dv of the values, new multipliers y, and weights W of the bounds,
 
 W dv + M dx + A^T y = value_right          A dv + J dx - S y = equation_right
 
-where S softens the equations: they may be missed by S (y - y0), which the objective pays for.
+where S softens the equations: their residual may be S (y - y0), at a price in the objective.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ import numpy as np
 from cspr_jax.families.free.search.derivatives import EquationValues
 from cspr_jax.numerics.shapes import Float
 
-# Fraction of its trace that is added to a matrix, which may be singular within rounding.
+# A matrix that may be singular within rounding is regularized by this fraction of its trace.
 ROUNDED = 1e-14
 
 
 def transposed(matrix: Float[np.ndarray, "... m n"]) -> Float[np.ndarray, "... n m"]:
-    """Transposes."""
+    """Transposes of matrices."""
     return np.swapaxes(matrix, -1, -2)
 
 
 def times(matrix: Float[np.ndarray, "... m n"], vector: Float[np.ndarray, "... n"]) -> Float[np.ndarray, "... m"]:
-    """Products with vectors."""
+    """Products of matrices and vectors."""
     return (matrix @ vector[..., None])[..., 0]
 
 
 class Softness(NamedTuple):
-    """How far equations may be missed, for a price.
+    """How large residuals of equations may be, at a price.
 
     Fields:
-        softness: (l,) S of the other values.
-        metric: (l, s, m, n, dof, dof) S of the tensions over `softness`.
+        softness: (l,) diagonal of S for equations other than those of tensions.
+        metric: (l, s, m, n, dof, dof) S for the equations of tensions, over `softness`.
         level: (l, s, m, n, n_equations) multipliers y0.
     """
 
@@ -44,27 +44,27 @@ class Softness(NamedTuple):
     level: np.ndarray
 
     def missed(self, multipliers: Float[np.ndarray, "l s m n n_equations"]) -> np.ndarray:
-        """S times vectors."""
+        """Residuals S y for multipliers y."""
         dof = self.metric.shape[-1]
         parts = times(self.metric, multipliers[..., :dof]), multipliers[..., dof:]
         return self.softness[:, None, None, None, None] * np.concatenate(parts, axis=-1)
 
     def paid(self, residual: Float[np.ndarray, "l s m n n_equations"]) -> np.ndarray:
-        """Vectors over S."""
+        """Multipliers y of residuals S y."""
         dof = self.metric.shape[-1]
         tensions = np.linalg.solve(self.metric, residual[..., :dof, None])[..., 0]
         return np.concatenate([tensions, residual[..., dof:]], axis=-1) / self.softness[:, None, None, None, None]
 
 
 class Condensed(NamedTuple):
-    """Newton's equations in the state alone, hessian dx + gradient = 0, and what follows from dx.
+    """Newton's equations in the state alone, hessian dx + gradient = 0, and how the rest follows from dx.
 
     Fields:
         hessian: (..., n_x, n_x).
         gradient: (..., n_x).
-        start: (..., n_values + n_equations) changes of the values and new multipliers if the state does not change.
-        decrease: (..., n_values + n_equations, n_x) by how much they decrease with the state; tensions, then
-            multipliers of their equations, then other values, then theirs.
+        start: (..., n_values + n_equations) changes of the values, and new multipliers, if the state does not change.
+        decrease: (..., n_values + n_equations, n_x) by how much these decrease with the state; first tensions, then
+            multipliers of their equations, then other values, then multipliers of theirs.
     """
 
     hessian: np.ndarray
@@ -75,7 +75,7 @@ class Condensed(NamedTuple):
     def changes(
         self, step: Float[np.ndarray, "... n_x"], n_cables: int, dof: int
     ) -> tuple[Float[np.ndarray, "... n_values"], Float[np.ndarray, "... n_equations"]]:
-        """Changes of the values, and new multipliers."""
+        """Changes of the values, and new multipliers, from changes of the state."""
         both = self.start - times(self.decrease, step)
         others = (both.shape[-1] - n_cables - dof) // 2
         parts = np.split(both, np.cumsum([n_cables, dof, others]), axis=-1)
@@ -89,7 +89,7 @@ def condensed(
     equation_right: Float[np.ndarray, "... n_equations"],
     soft: Softness,
 ) -> Condensed:
-    """Condense values and multipliers."""
+    """Eliminate values and multipliers."""
     matrix, softness = equations.matrix, soft.softness[:, None, None, None, None]
     dof, cables = matrix.shape[-2:]
     system = np.zeros((*weights.shape[:-1], cables + dof, cables + dof))
@@ -120,7 +120,7 @@ def repaired_values(
     missed: Float[np.ndarray, "l s m n n_equations"],
     soft: Softness,
 ) -> Float[np.ndarray, "l s m n n_values"]:
-    """Changes dv of the values that make up for what equations miss, e, with the state as it is.
+    """Changes dv of the values that correct residuals e of the equations while the state stays the same.
 
     They minimise dv^T W dv + (e + A dv)^T (e + A dv) / S.
     """

@@ -1,7 +1,7 @@
 """Equations of a motion at many samples, and their first and second derivatives.
 
-Derivatives are taken by the coordinates and their derivatives in time, of which most results depend on few; those by
-the duration, and in normalised time, follow from them.
+Derivatives are taken by the coordinates and their derivatives in time, as most results depend on few of them; those by
+the duration and by derivatives in normalised time follow from these.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.criteria import pose_conditions
 
 BATCH = 256
-# Entries of x after the coordinates and their derivatives.
+# Number of entries of x after the coordinates and their derivatives.
 SCALARS = 2
-# Powers of one over the duration, by which derivatives in normalised time become those in time.
+# Powers of 1 / duration that turn derivatives in normalised time into those in time.
 POWERS = np.arange(3.0)
 
 
 class EquationValues(NamedTuple):
-    """Residuals of the equations at samples, as far as they depend on the state and on tensions, and their derivatives.
+    """Those parts of the residuals at samples that depend on the state and on tensions, with derivatives.
 
     Derivatives are by x: the coordinates, their first and second derivatives in normalised time, the duration, and the
-    level of the objective, on which the equations do not depend.
+    level of the objective; the equations do not depend on the level.
 
     Fields:
-        residual: (..., n_equations) what tensions miss of the wrench, over the weight; then minus the values other than
-            tensions that the state has, to which the unknown values are added.
+        residual: (..., n_equations) wrench that the tensions fail to supply, over the weight; then, for values other
+            than tensions, minus the value of the state, to which the search adds the unknown value.
         jacobian: (..., n_equations, n_x).
         matrix: (..., dof, n_cables) wrenches of unit tensions.
         hessian: (..., n_x, n_x) second derivatives of the residuals times multipliers.
-        mixed: (..., n_cables, n_x) of the same, by a tension and x.
+        mixed: (..., n_cables, n_x) second derivatives of the same by a tension and by x.
     """
 
     residual: Any
@@ -68,7 +68,7 @@ def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, sam
 
 
 def _motion(normalised: Array, duration: Array) -> tuple[Array, Array, Array]:
-    # Coordinates and derivatives in time, from those in normalised time, (3, d).
+    # Return coordinates and derivatives in time from those in normalised time, (3, d).
     return tuple(normalised * (duration**-POWERS)[:, None])
 
 
@@ -114,7 +114,7 @@ def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, samples: tup
 
 
 def _hessian(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
-    # Second derivatives by coordinates, velocities and accelerations, (3 d, 3 d), each pair of these once.
+    # Return second derivatives by coordinates, velocities and accelerations, (3 d, 3 d); each pair is computed once.
     parts: list[tuple[Array, ...]] = [jax.jacfwd(jax.grad(function, range(k, 3)), k)(*motion) for k in range(3)]
     return jnp.block([[parts[k][i - k] if k <= i else parts[i][k - i].T for k in range(3)] for i in range(3)])
 
@@ -122,7 +122,7 @@ def _hessian(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
 def _chained(
     motion: Sequence[Array], duration: Array, jacobian: Array, hessian: Array, multipliers: Array
 ) -> tuple[Array, Array]:
-    # Derivatives by coordinates in normalised time, by the duration and by the level, from those by the motion in time.
+    # Convert derivatives by the motion in time to those by coordinates in normalised time, duration and level.
     d, flat = len(motion[0]), jnp.concatenate(motion)
     power = np.repeat(POWERS, d)
     scale, along = duration**-power, -power * flat / duration
@@ -147,14 +147,14 @@ def equation_values(
 def residuals(
     robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *samples: np.ndarray
 ) -> Float[np.ndarray, "... n_equations"]:
-    """Residuals of the equations at many samples, for trials of steps, which need no derivatives."""
+    """Residuals of the equations at many samples, without derivatives, for trials of steps."""
     return _at_all(lambda part: (_residual_kernel(robot, limits, longest, part),), samples)[0]
 
 
 def _at_all(
     kernel: Callable[[tuple[Array, ...]], Sequence[Array]], samples: tuple[np.ndarray, ...]
 ) -> list[np.ndarray]:
-    # Results of a kernel, leaves (..., ...).
+    # Call a kernel on flattened samples; return leaves (..., ...).
     shape = samples[2].shape
     flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in samples)
     return [values.reshape(*shape, *values.shape[1:]) for values in in_batches(kernel, flat, batch_size=BATCH)]

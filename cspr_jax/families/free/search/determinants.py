@@ -1,8 +1,8 @@
 """Determinants of the wrenches of unit tensions, and their derivatives.
 
-A determinant is a sum of products of minors of three rows, and such a minor is linear in each of its columns. So its
-second derivatives need no more than first derivatives of the wrenches, and cofactors; all are polynomials, which stay
-finite where the determinant vanishes.
+A determinant is a sum of products of minors of three rows, and each minor is linear in each of its columns. So its
+second derivatives need only first derivatives of the wrenches, and cofactors; all are polynomials, which stay finite
+where the determinant vanishes.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.state import State
 
-# Rows of a minor; those of forces and of moments of a platform in space.
+# Number of rows of a minor: as many as a spatial platform has forces, or moments.
 MINOR = 3
 FORCES, MOMENTS = slice(0, MINOR), slice(MINOR, 2 * MINOR)
 
 
 class Determinant(NamedTuple):
-    """A determinant and its derivatives by d coordinates.
+    """A determinant and its derivatives with respect to d coordinates.
 
     Fields:
-        value: ().
-        gradient: (d,).
-        hessian: (d, d) without second derivatives of the matrix.
-        cofactors: (n, n) by which second derivatives of the matrix count in those of the determinant.
+        value: () the determinant.
+        gradient: (d,) first derivatives.
+        hessian: (d, d) second derivatives, without the part from second derivatives of the matrix.
+        cofactors: (n, n) weights of second derivatives of the matrix in those of the determinant.
     """
 
     value: Array
@@ -62,7 +62,7 @@ def with_derivatives(matrix: Callable[[Array], Array], point: Float[Array, "d"])
     if len(values) == MINOR:
         value, (cofactors, hessian) = _minors(values)[0], _weighted(jnp.ones(1), values, derivatives)
     else:
-        # Laplace's expansion, with minors of the moments as constant weights of those of the forces, and the reverse.
+        # Laplace's expansion: minors of the moments are constant weights of minors of the forces, and vice versa.
         (forces, by_forces), (moments, by_moments) = (
             (_minors(values[part]), jax.jacfwd(lambda point, part=part: _minors(matrix(point)[part]))(point))
             for part in (FORCES, MOMENTS)
@@ -81,8 +81,8 @@ def with_derivatives(matrix: Callable[[Array], Array], point: Float[Array, "d"])
 
 
 def _minors(rows: Array) -> Array:
-    # Determinants of three rows for each choice of three columns, in the order of `combinations`; computed number by
-    # number, since gathering columns takes much longer.
+    # Return determinants of three rows for each choice of three columns, in the order of `combinations`. They are
+    # computed number by number, since gathering columns takes much longer.
     columns = range(rows.shape[1])
     a, b, c = ([rows[i, j] for j in columns] for i in range(MINOR))
     pairs = {(i, j): a[i] * b[j] - a[j] * b[i] for i, j in itertools.combinations(columns, 2)}
@@ -95,8 +95,8 @@ def _minors(rows: Array) -> Array:
 
 
 def _weighted(weights: Array, rows: Array, derivatives: Array) -> tuple[Array, Array]:
-    # Derivatives of a sum of weighted minors: first ones by the rows, (3, n), and second ones by coordinates, (d, d),
-    # from the derivatives of the rows, (3, n, d).
+    # Return derivatives of a weighted sum of minors: the first by the rows, (3, n), and the second by coordinates,
+    # (d, d), from derivatives of the rows, (3, n, d).
     alternating, across = _alternating(rows.shape[1]), _alternating(MINOR)[0]
     products = jnp.einsum("klm,cm->klc", jnp.tensordot(weights, alternating, 1), rows)
     matrices = jnp.einsum("klc,abc->klab", products, across)
@@ -106,7 +106,7 @@ def _weighted(weights: Array, rows: Array, derivatives: Array) -> tuple[Array, A
 
 @cache
 def _alternating(count: int) -> np.ndarray:
-    # Signs of permutations of the columns of each minor, (minors, n, n, n).
+    # Return signs of permutations of the columns of each minor, (minors, n, n, n).
     sets = list(itertools.combinations(range(count), MINOR))
     signs = np.zeros((len(sets), count, count, count))
     for number, columns in enumerate(sets):
@@ -118,7 +118,7 @@ def _alternating(count: int) -> np.ndarray:
 
 @cache
 def _laplace(count: int) -> tuple[Any, np.ndarray]:
-    # Signs of the minors of the first three rows in Laplace's expansion, and indices of their complementary minors.
+    # Return signs of the minors of the first three rows in Laplace's expansion, and indices of complementary minors.
     sets = list(itertools.combinations(range(count), MINOR))
     rest = [tuple(column for column in range(count) if column not in columns) for columns in sets]
     signs = np.array([(-1.0) ** (sum(columns) - MINOR) for columns in sets])

@@ -1,8 +1,8 @@
 """Equations and bounds of a motion at one time, for a search.
 
-Values are the tensions over the weight, and whatever else limits bound, over the limit. Tensions are unknowns of their
-own: equations say that they balance the motion, and that all other values are those of its state. So redundant cables
-need no rule, and no matrix is inverted; that of a platform may be singular on the path.
+Values are the tensions over the weight, and all other limited quantities over their limits. All values are unknowns:
+equations say that the tensions balance the motion, and that the other values are those of its state. So redundant
+cables need no rule, and no matrix is inverted; that of a platform may be singular on the path.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import BELOW, Criterion, pose_conditions
 
 BATCH = 128
-# Entries of x after the coordinates and their derivatives.
+# Number of entries of x after the coordinates and their derivatives.
 SCALARS = 2
 # Derivatives of the pose on which quantities depend.
 ORDERS = {"depth": 0, "length": 0, "speed": 1, "mass_centre_speed": 1, "acceleration": 2, "mass_centre_acceleration": 2}
@@ -38,7 +38,7 @@ DEPTH = 0.02
 
 
 def coordinates(pattern: str) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of an effector."""
+    """Indices of the coordinates of position and of rotation of an effector."""
     pattern_row = PATTERNS[pattern]
     return np.array(pattern_row.forces, int), np.array(pattern_row.moments, int)
 
@@ -58,13 +58,13 @@ def state_of(robot: AnyRobot, reference: Float[Array, "4"], *motion: Float[Array
 
 
 def keeps_depth(robot: AnyRobot) -> bool:
-    """Tell whether the depth below the plane of the spools is a value."""
+    """Tell whether the depth below the spool plane is one of the values."""
     return pose_conditions(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
 
 
 def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
-    # Values beside tensions, duration and determinant: over limits, of the mass centre squared; depths over the
-    # robot's radius.
+    # Return values other than tensions, duration and determinant: over limits, squares for the mass centre; depths over
+    # the robot's radius.
     length, rate, second_derivative = cable_motion(robot, state)
     radius = spool_radius(robot)
     values = {
@@ -92,7 +92,7 @@ def residual_at(
     motion: Sequence[Array],
     tensions: Float[Array, "n_cables"],
 ) -> Float[Array, "n_equations"]:
-    """Residual of the equations at one time, without those of duration and determinant."""
+    """Residual of the equations at one time, without those for duration and determinant."""
     state, unit = state_of(robot, reference, *motion), wrench_units(robot)
     wrench = robot.wrench_matrix(state) @ tensions - robot.inertial_wrench(state) / (robot.mass * robot.gravity)
     return jnp.concatenate([wrench / unit, -_other_values(robot, limits, state)])
@@ -108,8 +108,8 @@ class ValueBounds(NamedTuple):
         falls: (n_criteria, n_values) by how much an upper bound falls.
         orders: (n_values,) up to which derivative of the pose a value depends on it, 3 where it does on tensions, too.
         determinant: index of the value that is the determinant; None without one.
-        depth: index of the value that is the depth below the plane of the spools, over the robot's radius; None
-            without such a plane.
+        depth: index of the value that is the depth below the spool plane, over the robot's radius; None without such a
+            plane.
     """
 
     low: np.ndarray
@@ -144,7 +144,7 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     for limit in other_limits(limits):
         allowed = np.broadcast_to(getattr(limits, limit.name), robot.n_cables if limit.per_cable else 1)
         for k, maximum in enumerate(allowed):
-            # Squares change twice as much.
+            # Squared values change twice as much.
             change = 1.0 / radius if limit.is_height else (2.0 if limit.of_mass_centre else 1.0) / maximum
             top = maximum / radius if limit.is_height else 1.0
             bottom = -1.0 if limit.quantity in ("speed", "acceleration") else -np.inf

@@ -19,29 +19,29 @@ from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints, 
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Bool, Float
 
-# Weight of the barriers at the start and at the end, and the factor and the power by which it falls.
+# Weight of the barriers at the start and at the end; it falls to the smaller of a fraction and a power of itself.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
 SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
-CLOSE = 10.0  # errors of Newton's equations, over the weight of the barriers, at which that weight falls
-MISSED = 1e-6  # largest residual of the equations in the end
-STEPS, PATIENCE = 250, 80  # in all, and for one weight of the barriers
-# Distance of values from their bounds at the start: at most this fraction of the range, and at most this number.
+CLOSE = 10.0  # the weight of the barriers falls once errors of Newton's equations are below this multiple
+MISSED = 1e-6  # largest residual of the equations at an optimum
+STEPS, PATIENCE = 250, 80  # largest number of steps, in all and with one weight of the barriers
+# Distance of values from their bounds at the start: the smaller of this fraction of the range and this number.
 INSIDE, AWAY = 0.1, 1e-2
-# Multipliers of bounds differ from barriers over gaps by at most this factor.
+# Multipliers of bounds differ at most by this factor from the weight of the barriers over the gap.
 MAX_RATIO = 1e10
 
 
 class OutOfTime(Exception):
-    """The time of a search has ended before it has converged."""
+    """The time of a search ended before it converged."""
 
 
 class Ending(NamedTuple):
-    """When searches end that have not converged, by `time.monotonic`.
+    """Times, by `time.monotonic`, at which searches end that have not converged.
 
     Fields:
-        until: s.
-        enough: from then on one optimum of each task is enough, s.
-        of_task: (l,) indices of the tasks; () where nothing is enough.
+        until: time at which all end, s.
+        enough: time from which one optimum for each task is enough, s.
+        of_task: (l,) indices of the tasks; () if one optimum is never enough.
     """
 
     until: float = np.inf
@@ -49,7 +49,7 @@ class Ending(NamedTuple):
     of_task: np.ndarray = np.zeros(0, int)
 
     def is_over(self, is_optimal: Bool[np.ndarray, "l"]) -> bool:
-        """Tell whether searches end now."""
+        """Tell whether searches must end now."""
         time_now = time.monotonic()
         return time_now > self.until or (
             time_now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
@@ -60,13 +60,13 @@ NEVER = Ending()
 
 
 class Optima(NamedTuple):
-    """Results.
+    """Results of searches.
 
     Fields:
-        unknowns: of all motions.
+        unknowns: unknowns of all motions.
         is_optimal: (l,) whether the search has converged.
         steps: (l,) number of steps.
-        is_stopped: whether Ctrl-C, or the time, has ended it.
+        is_stopped: whether Ctrl-C, or a time limit, ended the search.
     """
 
     unknowns: Unknowns
@@ -76,7 +76,7 @@ class Optima(NamedTuple):
 
 
 def _sharpened(points: SearchPoints, levels: Levels) -> tuple[Levels, np.ndarray]:
-    # Reduce weights and softness where their optimum is reached; return them with the errors.
+    # Reduce weights and softness of searches that are close to their optimum; return them with the errors.
     barrier, (softness, metric, level) = levels
     while True:
         levels = Levels(barrier, Softness(softness, metric, level))
@@ -121,7 +121,7 @@ def optima(
 
 
 def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
-    # Put motions into the result as their searches end, and tell whether all have ended in time.
+    # Store motions in the result as their searches end, and tell whether all ended in time.
     indices = np.arange(len(result.steps))
     regularization, waited = np.zeros(len(indices)), np.zeros(len(indices))
     for number in range(STEPS + 1):
@@ -154,7 +154,7 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
 
 
 def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
-    # Keep the multipliers of bounds near barriers over gaps.
+    # Keep multipliers of bounds near the weight of the barriers over the gap.
     unknowns, multipliers = points.unknowns, []
     for multiplier, gap in zip(
         (unknowns.low_multipliers, unknowns.high_multipliers), points.tasks.gaps(unknowns), strict=True
@@ -167,7 +167,7 @@ def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
 
 
 def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
-    """Unknowns of motions found before, from which a search within other bounds begins."""
+    """Unknowns of earlier motions, from which a search within other bounds starts."""
     low, high = tasks.bounds(unknowns.level)
     inside = np.minimum(np.sqrt(barrier), INSIDE * (high - low))
     return _with_multipliers(
@@ -183,7 +183,7 @@ def _with_multipliers(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unkno
 def started(
     tasks: Tasks, controls: np.ndarray, duration: Float[np.ndarray, "l s"], barrier: float = BARRIERS[0]
 ) -> Unknowns:
-    """Unknowns of motions from which a search begins."""
+    """Unknowns of motions from which a search starts."""
     count, cables, dof = duration.shape[1], tasks.robot.n_cables, tasks.robot.dof
     acceleration = tasks.accelerations.copy()
     for side, index, sign in ((0, OUTER - 1, 3.0), (1, -OUTER, -3.0)):
@@ -198,7 +198,7 @@ def started(
     level, inner = np.full(duration.shape, tasks.objective.start), controls[:, :, OUTER:-OUTER].copy()
     unknowns = Unknowns(inner, duration.copy(), acceleration, level, values, empty, values, values)
     equations, residual = tasks.equations(unknowns)
-    # Tensions nearest to the middle of their range that balance the motion.
+    # Return tensions that balance the motion and are nearest to the middle of their range.
     low, high = tasks.bounds(level)
     middle = 0.5 * (low[..., :cables] + high[..., :cables])
     matrix = equations.matrix

@@ -1,4 +1,4 @@
-"""Steps of Newton's method: banded matrices of segments, with durations and accelerations at poses as borders."""
+"""Steps of Newton's method: matrices are banded for segments, bordered by durations and accelerations at poses."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cspr_jax.families.free.search.derivatives import SCALARS, EquationValues
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Float
 
-# Regularization, which is added to the diagonal where the matrix is not positive definite.
+# Smallest and largest regularization, added to the diagonal of a matrix that is not positive definite.
 MIN_REGULARIZATION, MAX_REGULARIZATION = 1e-6, 1e6
-GROWING = 6.0  # factor from one try of a step to the next
-SHRINKING = 3.0  # divisor from a step to the first try of the next step
+GROWING = 6.0  # growth of the regularization from one try of a step to the next
+SHRINKING = 3.0  # the next step first tries the last regularization over this
 TRIES = 25
 
 
@@ -25,8 +25,8 @@ class Step(NamedTuple):
 
     Fields:
         change: of the unknowns.
-        merit_derivative: (l,) derivative of the merit along it.
-        regularization: (l,) what was added to the diagonal.
+        merit_derivative: (l,) derivative of the merit along the step.
+        regularization: (l,) number added to the diagonal.
         missed: (l, s, m, n, n_equations) change of the residuals of equations, to first order.
         weights: (l, s, m, n, n_values) second derivatives of the barriers by the values.
     """
@@ -43,7 +43,7 @@ class Step(NamedTuple):
 
 
 class _Bordered(NamedTuple):
-    # Newton's equations of segments, (l, s, ...): of inner coordinates as banded matrices, with borders, and right-hand
+    # Newton's equations of segments, (l, s, ...): banded matrices of inner coordinates, their borders, and right-hand
     # sides.
     banded: np.ndarray
     beside: np.ndarray
@@ -53,7 +53,7 @@ class _Bordered(NamedTuple):
 
 
 def assembled_gradient(basis: Basis, gradients: np.ndarray) -> np.ndarray:
-    """Gradient of a sum over samples."""
+    """Gradient of a sum over samples, by all coordinates."""
     d = (gradients.shape[-1] - SCALARS) // 3
     derivatives = gradients[..., :-SCALARS].reshape(*gradients.shape[:-1], 3, d)
     local = np.einsum("mnrk,lsmnrd->lsmkd", basis.functions, derivatives, optimize=True)
@@ -64,7 +64,7 @@ def assembled_gradient(basis: Basis, gradients: np.ndarray) -> np.ndarray:
 
 
 def _assembled_hessian(basis: Basis, hessians: np.ndarray) -> np.ndarray:
-    # The Hessian of a sum over samples, (l, s, K d + 2, K d + 2), as in `assembled_gradient`.
+    # Return the Hessian of a sum over samples, (l, s, K d + 2, K d + 2), as in `assembled_gradient`.
     d = (hessians.shape[-1] - SCALARS) // 3
     m, n = basis.tau.shape
     weights = np.zeros((m, n, 3 * d + SCALARS, LOCAL * d + SCALARS))
@@ -86,7 +86,7 @@ def _assembled_hessian(basis: Basis, hessians: np.ndarray) -> np.ndarray:
 def _segments(
     tasks: Tasks, unknowns: Unknowns, hessian: np.ndarray, gradient: np.ndarray, lagrangian_gradient: np.ndarray
 ) -> _Bordered:
-    # Newton's equations hessian z + gradient = 0 in inner coordinates, and in durations, accelerations and the level.
+    # Return Newton's equations hessian z + gradient = 0 in inner coordinates, durations, accelerations and the level.
     d, border = tasks.ends.shape[-1], tasks.border
     inner = np.arange(OUTER * d, (tasks.basis.controls - OUTER) * d)
     columns = np.append(border, tasks.basis.controls * d + np.arange(SCALARS))
@@ -106,8 +106,8 @@ def _segments(
 def _solved(
     segments: _Bordered, k: int, is_moving: np.ndarray, regularization: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    # Changes of inner coordinates, (s, n), and of durations, accelerations and the level; None where the matrix is not
-    # positive.
+    # Return changes of inner coordinates, (s, n), and of durations, accelerations and the level; None if the matrix is
+    # not positive definite.
     count, d, n = len(segments.banded[k]), (segments.border.shape[-1] - SCALARS) // 2, len(is_moving)
     matrix, right, parts = regularization * np.eye(n), np.zeros(n), []
     for s in range(count):
@@ -137,7 +137,7 @@ def _solved(
 def _changes(
     tasks: Tasks, unknowns: Unknowns, segments: _Bordered, regularization: np.ndarray
 ) -> tuple[Unknowns, np.ndarray]:
-    # Changes of control points, durations, accelerations and levels, and the numbers added to the diagonal.
+    # Return changes of control points, durations, accelerations and levels, and the numbers added to the diagonal.
     count, d = len(unknowns.duration[0]), tasks.ends.shape[-1]
     changes = [np.zeros_like(part) for part in unknowns[:4]]
     used = np.zeros(len(regularization))
@@ -172,7 +172,7 @@ def newton_step(
     soft: Softness,
     regularization: Float[np.ndarray, "l"],
 ) -> Step:
-    """Step towards the optimum with a barrier before the bounds."""
+    """Step towards the optimum with barriers at the bounds."""
     cables, gaps = tasks.robot.n_cables, tasks.gaps(unknowns)
     equations, weights, value_right, by_scalars = _with_objective(tasks, unknowns, equations, gaps, wide(barrier))
     local = condensed(equations, weights, value_right, -residual - soft.missed(soft.level), soft)
@@ -205,8 +205,8 @@ def _with_objective(
     gaps: tuple[np.ndarray, np.ndarray],
     barrier: np.ndarray,
 ) -> tuple[EquationValues, np.ndarray, np.ndarray, np.ndarray]:
-    # Return the equations, to which derivatives of objective and barriers are added; second derivatives and right-hand
-    # side of the values; and the derivative of the objective by duration and level, (l, s, 2).
+    # Return the equations with derivatives of objective and barriers added, second derivatives and right-hand side of
+    # the values, and the derivative of the objective by duration and level, (l, s, 2).
     objective, cables, energy_weights = tasks.objective, tasks.robot.n_cables, tasks.energy_weights
     lifts, signs = (objective.low_lift, objective.high_lift), (1.0, -1.0)
     weights = [old / gap for old, gap in zip((unknowns.low_multipliers, unknowns.high_multipliers), gaps, strict=True)]
@@ -228,7 +228,7 @@ def _with_objective(
 
 
 def _at_samples(tasks: Tasks, unknowns: Unknowns, change: Unknowns) -> np.ndarray:
-    # Changes of the coordinates with two derivatives, the duration and the level at all samples, (l, s, m, n, n_x).
+    # Return changes of coordinates with two derivatives, duration and level at all samples, (l, s, m, n, n_x).
     d, count = tasks.ends.shape[-1], len(unknowns.duration[0])
     moving = np.zeros((*unknowns.duration.shape, tasks.basis.controls * d))
     moving[..., OUTER * d : -OUTER * d] = change.inner.reshape(*moving.shape[:2], -1)

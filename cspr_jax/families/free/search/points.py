@@ -1,4 +1,4 @@
-"""Motions with their equations at all samples, during a search, and steps along which their merit falls."""
+"""Motions with their equations at all samples, and steps along which their merit decreases."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from cspr_jax.families.free.search.newton import Step, assembled_gradient
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Float
 
-LARGE = 100.0  # mean multiplier of bounds above which errors are measured relative to it
-REGULAR = 1e-6  # added to the metric of the tensions, so that it is regular
+LARGE = 100.0  # errors are relative to the mean multiplier of bounds if it is above this
+REGULAR = 1e-6  # regularization of the metric of the tensions
 
 
 class Levels(NamedTuple):
-    """Weight of the barriers, (l,), and how far equations may be missed."""
+    """Weight of the barriers, (l,), and softness of the equations."""
 
     barrier: np.ndarray
     soft: Softness
@@ -33,8 +33,8 @@ class SearchPoints:
     """l motions with their equations.
 
     Fields:
-        equations: leaves (l, s, m, n, ...).
-        residual: (l, s, m, n, n_equations) of them, with all values.
+        equations: values and derivatives of the equations, leaves (l, s, m, n, ...).
+        residual: (l, s, m, n, n_equations) residuals, which all values enter.
     """
 
     tasks: Tasks
@@ -53,16 +53,16 @@ class SearchPoints:
         return SearchPoints(self.tasks.take(indices), self.unknowns.take(indices), equations, self.residual[indices])
 
     def metric(self) -> Float[np.ndarray, "l s m n dof dof"]:
-        """Metric of the residual of tensions' equations: a force counts as the tensions that it would take."""
+        """Metric for residual wrenches: a wrench counts as much as the tensions that supply it."""
         matrix = self.equations.matrix
         return matrix @ transposed(matrix) + REGULAR * np.eye(matrix.shape[-2])
 
     def missed(self) -> Float[np.ndarray, "l"]:
-        """By how much equations are missed, at most."""
+        """Largest residual of the equations."""
         return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
 
     def errors(self, levels: Levels) -> Float[np.ndarray, "l"]:
-        """Largest errors of Newton's equations."""
+        """Largest error of Newton's equations."""
         tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
         count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.ends.shape[-1], tasks.robot.n_cables
         gradient = assembled_gradient(tasks.basis, times(transposed(self.equations.jacobian), unknowns.multipliers))
@@ -92,9 +92,9 @@ class SearchPoints:
         return np.maximum(largest / unit, np.abs(price).reshape(count, -1).max(1))
 
 
-HALVINGS = 8  # of a step, at most
-FRACTION, CORRECTED = 0.99, 0.9  # fractions of the distance to a bound that steps, and corrections, may go
-DESCENT = 1e-4  # by which the merit must fall, over its derivative times the step
+HALVINGS = 8  # largest number of times that a step is halved
+FRACTION, CORRECTED = 0.99, 0.9  # steps, and corrections, may go these fractions of the distance to a bound
+DESCENT = 1e-4  # smallest decrease of the merit, over its derivative times the step
 
 
 def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
@@ -108,7 +108,7 @@ def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.nd
 
 
 def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    # Longest steps, up to 1, by which no value loses more than a fraction of itself, (l,).
+    # Return the longest steps, up to 1, in which no value decreases by more than a fraction of itself, (l,).
     lengths = np.ones(len(pairs[0][0]))
     for value, change in pairs:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -118,7 +118,7 @@ def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 
 
 def _lengths(points: SearchPoints, step: Step) -> tuple[np.ndarray, np.ndarray]:
-    # Longest steps of the unknowns, and of the multipliers of bounds.
+    # Return the longest steps of the unknowns, and of the multipliers of bounds.
     tasks, unknowns, change = points.tasks, points.unknowns, step.change
     gaps = zip(tasks.gaps(unknowns), tasks.gap_changes(change), strict=True)
     duals = (unknowns.low_multipliers, change.low_multipliers), (unknowns.high_multipliers, change.high_multipliers)
@@ -135,10 +135,10 @@ def _merit(tasks: Tasks, unknowns: Unknowns, residual: np.ndarray, levels: Level
 
 
 def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
-    """Go a step, halved until the merit falls.
+    """Take a step, halved until the merit decreases.
 
-    A trial at which it does not fall is tried once more with values that make up for the curvature of the equations
-    (a second-order correction). Without it, steps of platforms, whose wrenches change with rotation, are too short.
+    A trial without a decrease is repeated with values that correct the curvature of the equations (a second-order
+    correction). Without it, steps of platforms, whose wrenches change with rotation, are too short.
     """
     primal, dual = _lengths(points, step)
     before = _merit(points.tasks, points.unknowns, points.residual, levels)
@@ -150,7 +150,7 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
         minimum = (
             before[indices] + DESCENT * primal[indices] * change.merit_derivative + 1e-12 * np.abs(before[indices])
         )
-        # Not written as "above": a merit of NaN does not fall.
+        # Do not write this as "above": NaN must not count as a decrease.
         is_over = ~(_merit(part.tasks, trial, residual, level) <= minimum)
         if not is_over.any():
             break
@@ -169,7 +169,7 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
 
 
 def _correction(points: SearchPoints, trial: Unknowns, step: Step, missed: np.ndarray, levels: Levels) -> np.ndarray:
-    # Changes of the values of a trial, inside their bounds, that make up for residuals which the step did not predict.
+    # Return changes of the values of a trial, within bounds, that correct residuals which the step did not predict.
     change = repaired_values(points.equations.matrix, step.weights, missed, levels.soft)
     low, high = (np.where(np.isfinite(gap), CORRECTED * gap, np.inf) for gap in points.tasks.gaps(trial))
     return np.clip(change, -low, high)

@@ -1,4 +1,4 @@
-"""Motions from which searches begin: lines, lines deflected to all sides, and swings about P0."""
+"""Motions from which searches start: lines, lines deflected to all sides, and swings about P0."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point, spool_radius
 
 ARCS = 3  # largest number of arcs of swings
-DEFLECTION = 0.35  # of lines, over their length
-# Durations of lines over those of motions with the acceleration of gravity.
+DEFLECTION = 0.35  # deflection of lines, over their length
+# Lines last this many times as long as with the acceleration of gravity.
 SLOWER = 1.3
 
 
@@ -44,7 +44,7 @@ def starts(tasks: Tasks, z0: float, max_count: int | None = None) -> Starts:
     for start, end in tasks.ends[:, 0]:
         lines = _lines(tasks, start, end)
         swings = _swings(tasks, start, end, z0, ARCS if max_count is None else max(1, max_count - len(lines)))
-        # Alternate, so that a small number of starts has both kinds.
+        # Alternate lines and swings, so that a small number of starts has both.
         begun += [one for pair in zip_longest(lines, swings) for one in pair if one is not None][:max_count]
     task = np.repeat(np.arange(len(tasks.ends)), len(begun) // len(tasks.ends))
     controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array([one.samples for one in begun]))
@@ -52,19 +52,19 @@ def starts(tasks: Tasks, z0: float, max_count: int | None = None) -> Starts:
 
 
 class _Start(NamedTuple):
-    # Coordinates (K, d) at the times where control points count most, and the duration, s.
+    # Coordinates (K, d) at the Greville abscissae of the control points, and the duration, s.
     samples: np.ndarray
     duration: float
 
 
 def _line(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    # The cubic law: at rest only at the ends, with accelerations there.
+    # Return a motion with a cubic law: at rest only at the ends, with accelerations there.
     tau = tasks.basis.averages[:, None]
     return start + (end - start) * (3.0 * tau**2 - 2.0 * tau**3)
 
 
 def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
-    # The line, and lines that are deflected to all sides.
+    # Return the straight line, and lines that are deflected to all sides.
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
     gravity, radius = float(tasks.robot.gravity), float(spool_radius(tasks.robot))
     length = float(np.linalg.norm((end - start)[: len(along)])) + radius * float(
@@ -78,7 +78,7 @@ def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
 
 
 def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, max_arcs: int) -> list[_Start]:
-    # Swings about P0 of one arc, two arcs, ...
+    # Return swings about P0 of one arc, two arcs, and so on.
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
     line, end_fraction, center = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
     center[: len(along)] = rest_point(z0)[along]
@@ -92,12 +92,12 @@ def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, max_arc
 
 
 def deflection_profile(tau: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """How far motions are deflected, at most 1 in the middle; at the ends neither position nor velocity changes."""
+    """Deflection over time, 1 in the middle; at the ends it changes neither position nor velocity."""
     return 16.0 * (tau * (1.0 - tau)) ** 2
 
 
 def deflections(chord: Float[np.ndarray, "d"], along: np.ndarray) -> list[np.ndarray]:
-    """Directions in which motions are deflected, first none."""
+    """Directions of deflections; the first is zero."""
     down = np.zeros(len(chord))
     down[np.flatnonzero(along == 2)] = 1.0
     directions = [np.zeros(len(chord)), -down, down]

@@ -1,7 +1,7 @@
-"""Motions that are sought together, and their unknowns: control points, durations, accelerations at poses, levels.
+"""Motions that are searched for together, and their unknowns: control points, durations, accelerations, levels.
 
-A motion is at a pose at each end of its segments, with a given velocity there, and an acceleration that both of its
-segments have. So the outer three control points at each end follow from the duration and the acceleration.
+At each end of a segment the motion is at a pose, with a given velocity, and an acceleration that both adjacent segments
+have. So duration and acceleration determine the outer three control points at each end.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 
-# Control points at each end that follow from the others.
+# Number of control points at each end that duration and acceleration determine.
 OUTER = 3
 
 
@@ -32,13 +32,13 @@ class Unknowns(NamedTuple):
 
     Fields:
         inner: (l, s, K - 6, d) control points between the outer ones.
-        duration: (l, s) s.
-        acceleration: (l, s + 1, d) at the poses, m/s^2, rad/s^2.
-        level: (l, s) of the objective, by which bounds of tensions move.
-        values: (l, s, m, n, n_values) as of `equations`.
-        multipliers: (l, s, m, n, n_equations).
-        low_multipliers: (l, s, m, n, n_values) multipliers of lower bounds, at least 0.
-        high_multipliers: (l, s, m, n, n_values) of upper bounds.
+        duration: (l, s) durations of segments, s.
+        acceleration: (l, s + 1, d) accelerations at the poses, m/s^2, rad/s^2.
+        level: (l, s) level of the objective, which shifts bounds of tensions.
+        values: (l, s, m, n, n_values) values at samples, as `equations` defines them.
+        multipliers: (l, s, m, n, n_equations) multipliers of the equations.
+        low_multipliers: (l, s, m, n, n_values) multipliers of lower bounds, not negative.
+        high_multipliers: (l, s, m, n, n_values) multipliers of upper bounds, not negative.
     """
 
     inner: np.ndarray
@@ -56,12 +56,12 @@ class Unknowns(NamedTuple):
 
 
 class ClearancePlanes(NamedTuple):
-    """Values at + gradient . coordinates, K at each sample, which have lower bounds as the values of limits have.
+    """K values at + gradient . coordinates at each sample; they have lower bounds, as values of limits have.
 
     Fields:
-        gradient: (l, s, m, n, K, d).
-        at: (l, s, m, n, K).
-        minimum: index of the pair of bodies, and their smallest clearance, m, for each plane.
+        gradient: (l, s, m, n, K, d) gradients by the coordinates.
+        at: (l, s, m, n, K) values at coordinates 0.
+        minimum: for each plane, the index of its pair of bodies and the clearance that they must keep, m.
     """
 
     gradient: np.ndarray
@@ -74,21 +74,21 @@ class Tasks:
     """l motions of s segments each, of d coordinates.
 
     Fields:
-        robot: centred, z down.
-        limits: of the robot.
-        basis: of all segments.
+        robot: centred robot, z down.
+        limits: limits of the robot.
+        basis: basis functions of all segments.
         ends: (l, s, 2, d) coordinates at start and end of each segment, m; Rodrigues vectors.
-        velocities: (l, s, 2, d) there, m/s, rad/s.
-        references: (l, s, 4) orientations from which Rodrigues vectors are measured.
-        turns: (l, s, 2, d, d) matrices that turn accelerations into second derivatives of the coordinates.
-        accelerations: (l, s + 1, d) at the poses, m/s^2, rad/s^2, where they are given.
-        is_free: (l, s + 1) whether they are not.
+        velocities: (l, s, 2, d) at start and end of each segment, m/s, rad/s.
+        references: (l, s, 4) orientations relative to which Rodrigues vectors are measured.
+        turns: (l, s, 2, d, d) matrices from accelerations to second derivatives of the coordinates.
+        accelerations: (l, s + 1, d) given accelerations at the poses, m/s^2, rad/s^2.
+        is_free: (l, s + 1) whether the acceleration at a pose is free instead.
         low: (l, s, m, n, n_values) lower bounds at level 0, -inf for none.
         high: (l, s, m, n, n_values) upper bounds at level 0, inf for none.
         scale: (l,) unit of durations in the objective: half a swing, s.
         objective: what is minimised.
         longest: () longest duration of a segment, s; None for any.
-        planes: their values are the last ones; None without any.
+        planes: clearance planes, whose values come last; None without any.
     """
 
     robot: AnyRobot
@@ -117,11 +117,11 @@ class Tasks:
 
     @property
     def n_limited(self) -> int:
-        """Number of the values that limits bound: those before planes."""
+        """Number of values before those of planes."""
         return self.low.shape[-1] - (0 if self.planes is None else self.planes.at.shape[-1])
 
     def within(self, planes: ClearancePlanes, low: np.ndarray) -> "Tasks":
-        """Tasks with other planes."""
+        """The same tasks with other planes."""
         count, none, objective = self.n_limited, np.full(low.shape, np.inf), self.objective
         low_lift, high_lift = (
             np.pad(lift[:count], (0, low.shape[-1])) for lift in (objective.low_lift, objective.high_lift)
@@ -135,7 +135,7 @@ class Tasks:
         )
 
     def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
-        """Unknowns of these tasks, from those with other planes: with the values of the planes, and multipliers 0."""
+        """Unknowns from those of tasks with other planes: with values of the planes, and multipliers 0 for them."""
         old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
 
         def changed(values: np.ndarray) -> np.ndarray:
@@ -164,18 +164,18 @@ class Tasks:
 
     @property
     def energy_weights(self) -> np.ndarray:
-        """Weights of the samples in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
+        """Weights of samples in the objective, for the squares of tensions times the duration, (l, 1, m, n, 1)."""
         return self.objective.energy / wide(self.scale) * self.basis.weights[..., None]
 
     def cost(self, unknowns: Unknowns) -> Float[np.ndarray, "l"]:
-        """The objective."""
+        """Objective of each task."""
         time = self.objective.time * unknowns.duration.sum(1) / self.scale
         squares = unknowns.values[..., : self.robot.n_cables] ** 2 * wide(unknowns.duration)
         energy = np.sum(self.energy_weights * squares, axis=(1, 2, 3, 4))
         return time + energy + self.objective.level * unknowns.level.sum(1)
 
     def energies(self, unknowns: Unknowns) -> Float[np.ndarray, "l s"]:
-        """Integrals of the sum of the squares of the tensions."""
+        """Integrals of the sum of the squares of the tensions over each segment."""
         squares = np.sum(unknowns.values[..., : self.robot.n_cables] ** 2, axis=-1)
         weight = float(self.robot.mass * self.robot.gravity)
         return weight**2 * unknowns.duration * np.sum(self.basis.weights * squares, axis=(2, 3))
@@ -192,7 +192,7 @@ class Tasks:
 
     @property
     def border(self) -> np.ndarray:
-        """Indices of the outer coordinates that move, among all K d of a segment, (4 d,)."""
+        """Indices of the outer coordinates that are not fixed, among all K d of a segment, (4 d,)."""
         d, last = self.ends.shape[-1], self.basis.controls * self.ends.shape[-1]
         return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
 
@@ -210,13 +210,13 @@ class Tasks:
         return controls
 
     def _second(self, unknowns: Unknowns, side: int) -> np.ndarray:
-        # Second derivatives in time of the coordinates at the start or end of each segment, (l, s, d).
+        # Return second derivatives in time of the coordinates at the start or end of each segment, (l, s, d).
         count = self.ends.shape[1]
         acceleration = unknowns.acceleration[:, side : count + side]
         return (self.turns[:, :, side] @ acceleration[..., None])[..., 0]
 
     def border_jacobians(self, unknowns: Unknowns) -> np.ndarray:
-        """Derivatives of the outer coordinates that move, by what moves them."""
+        """Derivatives of the outer coordinates that are not fixed, by the duration and the accelerations."""
         d, time, basis = self.ends.shape[-1], unknowns.duration[..., None], self.basis
         jacobians = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
         for side, sign in ((0, 1.0), (1, -1.0)):
@@ -230,7 +230,7 @@ class Tasks:
         return jacobians
 
     def border_hessians(self, unknowns: Unknowns, multipliers: np.ndarray) -> np.ndarray:
-        """Second derivatives of the outer coordinates, times multipliers."""
+        """Second derivatives of the same coordinates, times multipliers."""
         d, twice = self.ends.shape[-1], 2.0 * self.basis.acceleration_step
         hessians = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
         for side in (0, 1):
@@ -257,7 +257,7 @@ class Tasks:
         return equations, self._with_values(equations.residual.copy(), unknowns)
 
     def residual(self, unknowns: Unknowns) -> Float[np.ndarray, "l s m n n_equations"]:
-        """Residuals of the equations at all samples, with all values."""
+        """Residuals of the equations at all samples, which all values enter."""
         missed, planes = residuals(*self._samples(unknowns)), self.planes
         return self._with_values(missed if planes is None else self._with_planes(missed, planes, unknowns), unknowns)
 
@@ -268,7 +268,7 @@ class Tasks:
         )
 
     def _samples(self, unknowns: Unknowns) -> tuple[Any, ...]:
-        # Arguments of the equations at all samples, except multipliers.
+        # Return the arguments of the equations at all samples, except multipliers.
         shape = unknowns.values.shape[:-1]
         return (
             self.robot,

@@ -1,10 +1,10 @@
-"""Lower bounds of the time of any motion between two poses at zero velocity, whatever its path.
+"""Lower bounds of the time of any motion between two poses at zero velocity, along any path.
 
-A length that changes by D from rest to rest, with accelerations up to a that speed it up and up to b that slow it
-down, and a speed up to v, takes no less than sqrt(2 D (1/a + 1/b)), or D / v + v (1/a + 1/b) / 2 if it comes to v. That
-holds for the length of each cable, and for the displacement of the mass centre along every direction e: tensions give
-it no more than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u
-points up.
+A length that changes by D from rest to rest, with accelerations up to a when speeding up and up to b when slowing down,
+and a speed up to v, takes at least sqrt(2 D (1/a + 1/b)), or D / v + v (1/a + 1/b) / 2 if it reaches v. This holds for
+the length of each cable, and for the displacement of the mass centre along every direction e: tensions accelerate it by
+at most e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u points
+upwards.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.criteria import pose_conditions
 
-ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)  # of directions in the vertical plane through both positions
-SAFE = 1e-9  # fraction by which bounds are lowered, more than their rounding
-LEVEL = 1e-12  # differences of heights of spools, over the robot's radius, that count as none
-SLANTED = 1e-5  # what such a difference may add to the upward component of a cable's direction
+ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)  # of directions in the vertical plane of both positions
+SAFE = 1e-9  # bounds are lowered by this fraction, which exceeds rounding errors
+LEVEL = 1e-12  # spools are level if their heights differ by less, over the robot's radius
+SLANTED = 1e-5  # largest effect of such a difference on the upward component of a direction
 Numbers = np.ndarray | float
 
 
 def least_time(
     distance: Float[np.ndarray, "..."], speeding: Numbers, slowing: Numbers, speed: Numbers
 ) -> Float[np.ndarray, "..."]:
-    """Least time of a distance from rest to rest."""
+    """Least time in which a distance is covered from rest to rest."""
     slowness = 1.0 / np.asarray(speeding) + 1.0 / np.asarray(slowing)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of no cap, no largest acceleration, no distance
+    with np.errstate(invalid="ignore", divide="ignore"):  # without a cap, a largest acceleration, or a distance
         is_capped = np.sqrt(2.0 * distance / slowness) > speed
         capped = distance / speed + 0.5 * speed * slowness
         return np.where(distance > 0.0, np.where(is_capped, capped, np.sqrt(2.0 * distance * slowness)), 0.0)
@@ -64,7 +64,7 @@ def _time_bound(problem: Problem, motion: Spline) -> float:
 
 @persistent_jit
 def _ends(robot: AnyRobot, motion: Spline) -> tuple[Array, Array]:
-    # Positions (2, 3) and lengths of the cables (2, n_cables) where a motion begins and where it ends.
+    # Return positions (2, 3) and cable lengths (2, n_cables) at the start and the end of a motion.
     states = jax.vmap(motion.state)(jnp.array([0.0, 1.0]))
     return states.position, jax.vmap(lambda state: cable_motion(robot, state)[0])(states)
 
@@ -72,7 +72,7 @@ def _ends(robot: AnyRobot, motion: Spline) -> tuple[Array, Array]:
 def _of_mass_centre(problem: Problem, displacement: np.ndarray) -> float:
     robot, limits = problem.robot, problem.limits
     level = np.linalg.norm(displacement[:2])
-    # Directions in the vertical plane of the displacement, as their level and downward components.
+    # Directions in the vertical plane of the displacement, by their horizontal and downward components.
     directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     along = directions @ np.array([level, displacement[2]])
     directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
@@ -89,5 +89,5 @@ def _of_mass_centre(problem: Problem, displacement: np.ndarray) -> float:
         )
 
     speed = np.inf if limits.speed_max is None else float(limits.speed_max)
-    with np.errstate(divide="ignore"):  # where nothing moves
+    with np.errstate(divide="ignore"):  # division by zero where nothing moves
         return float(np.max(least_time(np.abs(along), largest(directions[:, 1]), largest(-directions[:, 1]), speed)))

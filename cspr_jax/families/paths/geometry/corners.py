@@ -1,7 +1,7 @@
-"""Corners of paths: consecutive elements, in parts from stop to stop, blended at corners or not.
+"""Corners of paths: consecutive elements are joined from stop to stop; corners are blended or are stops.
 
-A blend is a quintic from a point on one element to a point on the next one, with the position, direction and
-curvature that the elements have there. Between straight lines it ends the distance d from the corner, and passes it at
+A blend is a quintic from a point on one element to a point on the next, with the position, direction and curvature of
+the elements at these points. Between straight lines, its ends are at the distance d from the corner, and its middle at
 the distance 3/8 d sin(angle / 2).
 """
 
@@ -14,9 +14,9 @@ import numpy as np
 from cspr_jax.families.paths.geometry.elements import Element, Nodes
 from cspr_jax.families.paths.geometry.section import PositionPath
 
-SAME_DIRECTION = 1e-9  # rad; directions that differ by less make no corner
-ROUNDED_DIRECTION = 1e-3  # rad; smaller corners come from rounded numbers, and are always blended
-ROUNDED = 1e-6  # m; tolerance of their blends
+SAME_DIRECTION = 1e-9  # rad; directions that differ by less form no corner
+ROUNDED_DIRECTION = 1e-3  # rad; corners below this are due to rounded numbers, and always blended
+ROUNDED = 1e-6  # m; tolerance of blends at such corners
 # Corners sharper than this, rad, are not blended: a motion along the blend would almost stop.
 TURNING_BACK = 2.9
 # Largest fraction of an element that a blend replaces.
@@ -28,7 +28,7 @@ Corners = Literal["every", "stop", "blend"]
 def position_paths_of(
     elements: Sequence[Element], corners: Corners = "stop", tolerance: float = 0.0
 ) -> list[PositionPath]:
-    """Paths from stop to stop; the points of each are the ends of its elements."""
+    """Paths from stop to stop through consecutive elements; knots are at the ends of elements."""
     lengths = _blend_lengths(elements, corners, tolerance)
     splits = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
     return [
@@ -38,7 +38,7 @@ def position_paths_of(
 
 
 def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: float) -> np.ndarray:
-    # Lengths that blends take off the elements at each corner; 0 where the direction is continuous, NaN at stops.
+    # Return the lengths that blends cut off the elements at corners: 0 if the direction is continuous, NaN at stops.
     if corners == "every":
         return np.full(len(elements) - 1, np.nan)
     element_lengths = np.array([element.length for element in elements])
@@ -68,7 +68,8 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
 
 
 def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarray) -> Nodes:
-    # Middles of blends from the last node of one element to the first node of the next, each twice its length long.
+    # Return the middles of blends from the last node of one element to the first node of the next; a blend is twice as
+    # long as the length cut off.
     _, position, first, second = (np.array([column[-1] for column in columns]) for columns in zip(*before, strict=True))
     _, *ends = (np.array([column[0] for column in columns]) for columns in zip(*after, strict=True))
     length = lengths[:, None]
@@ -81,7 +82,7 @@ def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarra
 
 
 def _position_path(elements: Sequence[Element], lengths: np.ndarray) -> PositionPath:
-    # Join elements, with blends in place of the given lengths at their ends; the first and the last length are 0.
+    # Join elements, with blends that replace these lengths at their ends; the first and the last length are 0.
     lines = [
         element.nodes(before, element.length - after)
         for element, (before, after) in zip(elements, itertools.pairwise(lengths.tolist()), strict=True)
@@ -105,7 +106,7 @@ def _position_path(elements: Sequence[Element], lengths: np.ndarray) -> Position
     joined = Nodes(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     twice = np.flatnonzero(joined.s[1:] == joined.s[:-1])
     for values in (joined.position, joined.first) if len(twice) else ():
-        # Elements miss each other by rounding.
+        # Ends of elements differ by rounding: take their mean.
         values[twice] = values[twice + 1] = 0.5 * (values[twice] + values[twice + 1])
     return PositionPath(
         joined.s, joined.position, joined.first, joined.second, np.concatenate(speeds), np.array([*knots, s])

@@ -1,4 +1,4 @@
-"""Elements of paths: straight lines and arcs, over their travelled length; arcs of plans, and moves of G-code."""
+"""Elements of paths over their travelled length: straight lines and arcs, of plans and of G-code."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from cspr_jax.config.gcode.reading import Move
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.shapes import Float
 
-# Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
+# Largest angle of a quintic piece, rad: it deviates from an arc of radius r by angle^6 r / 46080, 8.3e-11 r.
 LARGEST_PIECE = 0.125
-# Positions that are nearer to each other are the same, m.
+# Positions closer than this count as the same, m.
 SAME_PLACE = 1e-9
 
 
@@ -42,8 +42,8 @@ class Straight:
     Fields:
         start: (3,) m.
         end: (3,) m.
-        turn: length of a line without extent, on which a platform only turns: the angle, rad.
-        speed: largest speed, m/s.
+        turn: angle, rad, if a platform only turns at one position; it then serves as the length.
+        speed: largest speed on the line, m/s.
         ends_at_rest: whether the motion stops at its end in any case.
     """
 
@@ -55,7 +55,7 @@ class Straight:
 
     @cached_property
     def moves(self) -> bool:
-        """Tell whether it has a direction."""
+        """Tell whether the line has a direction."""
         return bool(np.linalg.norm(self.end - self.start) > SAME_PLACE)
 
     @cached_property
@@ -64,13 +64,13 @@ class Straight:
         return float(np.linalg.norm(self.end - self.start)) if self.moves else self.turn
 
     def nodes(self, first: float, last: float) -> Nodes:
-        """Nodes between two lengths."""
+        """Nodes between two travelled lengths."""
         return self.at(np.array([first, last]))
 
     def at(self, s: Float[np.ndarray, "n"]) -> Nodes:
-        """States at lengths."""
+        """States at travelled lengths."""
         fraction, step = (s / self.length)[:, None], (self.end - self.start) / self.length
-        # This form meets the ends of lines without rounding.
+        # This form gives the ends of the line without rounding.
         position = self.start * (1.0 - fraction) + self.end * fraction
         return Nodes(s, position, np.array([step] * len(s)), np.zeros((len(s), 3)))
 
@@ -80,12 +80,12 @@ class Arc:
     """Arc of a circle, or of a helix.
 
     Fields:
-        centre: (3,) m, in the plane of its start.
+        centre: (3,) centre in the plane of the start, m.
         start: (3,) m.
-        axis: (3,) unit vector about which it turns.
-        angle: by which it turns, by the rule of the right hand, rad; not zero.
-        rise: along the axis, from start to end, m.
-        speed: largest speed, m/s.
+        axis: (3,) unit vector of the axis of rotation.
+        angle: angle of rotation about the axis, by the right-hand rule, rad; not zero.
+        rise: displacement along the axis from start to end, m.
+        speed: largest speed on the arc, m/s.
         ends_at_rest: whether the motion stops at its end in any case.
     """
 
@@ -105,11 +105,11 @@ class Arc:
 
     @property
     def end(self) -> np.ndarray:
-        """Position of its end, (3,) m."""
+        """Position of the end, (3,) m."""
         return self.at(np.array([self.length])).position[0]
 
     def nodes(self, first: float, last: float) -> Nodes:
-        """Nodes between two lengths, near enough to each other for quintic pieces; see `Straight.nodes`."""
+        """Nodes between two lengths, close enough to each other for quintic pieces; see `Straight.nodes`."""
         count = max(int(np.ceil(abs(self.angle) * (last - first) / self.length / LARGEST_PIECE)), 1)
         return self.at(np.linspace(first, last, count + 1))
 
@@ -127,7 +127,7 @@ class Arc:
 Element = Straight | Arc
 
 
-# Distance of the start of an arc from the plane of its centre that counts as rounding, over its radius.
+# The start of an arc may be off the plane of its centre by this fraction of its radius, due to rounding.
 BESIDE = 1e-6
 
 
@@ -146,7 +146,7 @@ def arc_of(
 
 
 def elements_of(moves: Sequence[Move]) -> list[Element]:
-    """Lines, arcs and helices of moves, each with a stop behind it where the program pauses."""
+    """Lines, arcs and helices of moves; where the program pauses, an element ends with a stop."""
     elements: list[Element] = []
     for move in moves:
         start, end = np.array(move.start), np.array(move.end)

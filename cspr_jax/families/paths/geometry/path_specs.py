@@ -1,4 +1,4 @@
-"""Paths between poses that a table of a plan describes: parts from stop to stop, with orientations at their knots."""
+"""Paths between poses that tables of a plan describe: parts from stop to stop, with orientations at knots."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import UNIT_NORM
 
-# Distance within which a file begins at the pose before it, m.
+# A file must start within this distance of the pose before it, m.
 MEETING = 1e-6
 
 
 class PathEnds(NamedTuple):
-    """Ends of a path, as far as poses decide them.
+    """Ends of a path; poses determine them, or the path itself.
 
     Fields:
-        start: (3,) m; None: the path decides.
-        end: (3,) m; None likewise.
-        first: (4,) orientation at the start, a unit quaternion; None: of a point mass.
-        last: (4,) at the end, likewise.
+        start: (3,) m; None: the path determines it.
+        end: (3,) m; None: the path determines it.
+        first: (4,) orientation at the start, a unit quaternion; None for a point mass.
+        last: (4,) orientation at the end; None for a point mass.
     """
 
     start: np.ndarray | None
@@ -46,7 +46,7 @@ class FileAxes(NamedTuple):
 
     Fields:
         z_axis: "up" or "down".
-        normal: (3,) default axis of arcs.
+        normal: (3,) axis of arcs that give none.
         turning: (4,) rotation from the reference axes of the platform to its axes in the file, a unit quaternion.
     """
 
@@ -56,14 +56,14 @@ class FileAxes(NamedTuple):
 
 
 class PathSpec(NamedTuple):
-    """Consecutive paths, with the motion at rest between them.
+    """Consecutive paths; the motion is at rest between them.
 
     Fields:
-        parts: at least one.
-        quaternions: for each the orientations at its knots, (k, 4) unit quaternions; empty: of a point mass.
-        is_planar: whether it was read without y.
-        feeds: as in `Section`.
-        notes: lines about the file for the user.
+        parts: the paths, at least one.
+        quaternions: for each path the orientations at its knots, (k, 4) unit quaternions; empty for a point mass.
+        is_planar: whether the table or file has no y.
+        feeds: words of G-code by speed; see `Section`.
+        notes: lines for the user about the file.
     """
 
     parts: list[PositionPath]
@@ -73,7 +73,7 @@ class PathSpec(NamedTuple):
     notes: Sequence[str] = ()
 
     def sections(self) -> list[Section]:
-        """The parts with their orientations."""
+        """The paths with their orientations."""
         units = self.quaternions
         sections = [section_of(part, units[i] if units else None) for i, part in enumerate(self.parts)]
         return [section._replace(feeds=self.feeds) for section in sections]
@@ -82,7 +82,7 @@ class PathSpec(NamedTuple):
 def path_through(
     table: PathTable, points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None
 ) -> PathSpec:
-    """Path through points."""
+    """Path of a table through given points."""
     closed = table.closed is True
     tolerance = table.blend_tolerance or 0.0
     parts = through_points(
@@ -97,7 +97,7 @@ def path_through(
 
 
 def path_of(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes) -> PathSpec:
-    """Path of a table that has its own points."""
+    """Path of a table that has points of its own."""
     if table.points is not None or table.kind == "csv":
         return _through_own(table, ends, folder, axes)
     units = orientations(table, 1 if table.kind == "gcode" else 2)
@@ -121,7 +121,7 @@ def path_of(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes) -> P
 
 
 def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] | None:
-    """Orientations that a table names."""
+    """Orientations that a table gives."""
     if table.orientations is None:
         return None
     units = np.asarray(table.orientations, float)
@@ -137,7 +137,7 @@ def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] |
 
 
 def _through_own(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes) -> PathSpec:
-    # Path through points of the table, or of its file, and the poses at its ends.
+    # Return the path through points of the table or of its file, and through the poses at its ends.
     units, is_planar, notes = None, False, list[str]()
     if table.kind == "csv":
         samples = read(folder / str(table.file), has_times=False).in_axes(axes.z_axis)
@@ -168,7 +168,7 @@ def _through_own(table: PathTable, ends: PathEnds, folder: Path, axes: FileAxes)
 
 
 def _check_start(position: np.ndarray, unit: np.ndarray | None, ends: PathEnds, file: str | None) -> None:
-    # Refuse a file that does not begin at the pose before it.
+    # Refuse a file that does not start at the pose before it.
     if np.linalg.norm(position - ends.start) > MEETING:
         raise InputError("file", file, f"one that begins where the pose before is, not at {position.round(6).tolist()}")
     if (
@@ -182,7 +182,7 @@ def _check_start(position: np.ndarray, unit: np.ndarray | None, ends: PathEnds, 
 def _between_poses(
     points: np.ndarray, units: np.ndarray | None, ends: PathEnds
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    # Add positions and orientations of the poses before and after the points.
+    # Add positions and orientations of the poses at both ends to the points.
     for position, unit, before in ((ends.start, ends.first, True), (ends.end, ends.last, False)):
         if position is not None:
             points = np.concatenate([position[None], points] if before else [points, position[None]])

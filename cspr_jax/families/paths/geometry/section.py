@@ -1,4 +1,4 @@
-"""Sections of paths: curves over the path coordinate s, without corners, made of quintic Hermite pieces."""
+"""Sections of paths: curves without corners over the path coordinate s, made of quintic Hermite pieces."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 
-# Orientations count as equal if half of the angle between them is less than this, rad.
+# Orientations count as equal if half the angle between them is smaller, rad.
 SAME_ORIENTATION = 1e-12
-# Largest half of an angle by which a piece turns, rad; a quintic misses a turn at a constant rate by 4e-7 of it.
+# Largest half angle of a turn on one piece, rad; a quintic deviates from a turn at constant rate by 4e-7 of it.
 LARGEST_TURN = 0.5
 
 
@@ -25,11 +25,11 @@ class Section(NamedTuple):
     """Part of a path without corners, along which a motion need not stop.
 
     Fields:
-        curve: positions and orientations over s, m, in place of time; continuous, with its first derivative; NumPy
-            leaves. Its second derivative may jump between pieces.
-        speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
-        knots: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
-        feeds: words of G-code, such as "F6000", by the speeds that they set, m/s.
+        curve: positions and orientations over s, m, in place of time; NumPy leaves. It is continuous with its first
+            derivative; the second derivative may jump between pieces.
+        speed: (pieces,) largest allowed speed, m/s; inf without one.
+        knots: (k,) s of the points of the path, from 0 to its length; each is a knot of the curve.
+        feeds: words of G-code, such as "F6000", by the speed that they set, m/s.
     """
 
     curve: Spline
@@ -42,10 +42,10 @@ class SectionSettings(NamedTuple):
     """Settings of the motion along a section.
 
     Fields:
-        grid: number of cells.
-        ramp_time: time in which accelerations rise and fall, s; 0: they jump.
-        start_speed: speed of the mass centre at its start, m/s.
-        end_speed: speed at its end, likewise, m/s.
+        grid: number of cells of the grid.
+        ramp_time: time in which accelerations rise and fall, s; 0 if they may jump.
+        start_speed: speed of the mass centre at the start, m/s.
+        end_speed: speed of the mass centre at the end, m/s.
     """
 
     grid: int
@@ -59,12 +59,12 @@ class PositionPath:
     """Positions of a section, as nodes of Hermite pieces.
 
     Fields:
-        s: (n,) increasing, from 0; two nodes at one s where the second derivative jumps.
+        s: (n,) increasing, from 0; two nodes at the same s where the second derivative jumps.
         position: (n, 3) m.
         first: (n, 3) derivative with respect to s.
         second: (n, 3) second derivative, 1/m.
-        speed: (n - 1,) largest speed of each piece, m/s; also of the empty ones.
-        knots: (k,) s of its points, each one of `s`.
+        speed: (n - 1,) largest speed on each piece, m/s, including empty ones.
+        knots: (k,) s of the points of the path, all of them in `s`.
     """
 
     s: np.ndarray
@@ -91,9 +91,9 @@ class PositionPath:
 
 
 def section_of(path: PositionPath, quaternions: Float[np.ndarray, "k 4"] | None = None) -> Section:
-    """Section of positions and of orientations at their knots.
+    """Section from positions, and from orientations at their knots.
 
-    Between two knots the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
+    Between two knots the orientation turns at a constant rate about one axis; through more knots it is a C2 spline.
     """
     turning = None
     if quaternions is not None:
@@ -117,7 +117,7 @@ def section_of(path: PositionPath, quaternions: Float[np.ndarray, "k 4"] | None 
 
 
 def _between(s: np.ndarray, width: float) -> np.ndarray:
-    # Values of s that cut intervals wider than a width.
+    # Return values of s that divide intervals wider than a given width.
     counts = np.ceil(np.diff(s) / width).astype(int)
     cuts = [np.linspace(a, b, count + 1)[1:-1] for a, b, count in zip(s[:-1], s[1:], counts, strict=True)]
     return np.concatenate(cuts)
@@ -130,7 +130,7 @@ def half_angles(units: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n-1"]:
 
 
 def turn(units: Float[np.ndarray, "2 4"], fraction: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:
-    """Orientations at a constant rate from one to another, and their derivatives."""
+    """Orientations and their derivatives on a turn at a constant rate from one to another."""
     half = float(half_angles(units)[0])
     across = units[1] - (units[1] @ units[0]) * units[0]
     across /= np.linalg.norm(across) or 1.0

@@ -14,16 +14,16 @@ from cspr_jax.families.paths.geometry.elements import SAME_PLACE, Straight
 from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, PositionPath, half_angles
 from cspr_jax.numerics.shapes import Float
 
-STANDING = 1e-6  # speed over the speed along the chords, below which a spline stops
-SAMPLES = 32  # of each piece of a spline, to find where it stops
-# Smallest ratio of the shortest to the longest chord of a spline: below it, pieces lose their digits.
+STANDING = 1e-6  # a spline stops if its speed over that along the chords is below this
+SAMPLES = 32  # samples of each piece of a spline, to find where it stops
+# Smallest ratio of the shortest to the longest chord of a spline; pieces of shorter ones have too few digits.
 SMALLEST_CHORD = 1e-6
 
 
 def chords(
     points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None = None
 ) -> Float[np.ndarray, "n-1"]:
-    """Distances between consecutive points; where only the orientation changes, the angle."""
+    """Distances between consecutive points; where only the orientation changes, its angle."""
     if len(points) < 2:
         raise InputError("points", None, "must be two or more", problem=f"{len(points)} of them")
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -45,7 +45,7 @@ def through_points(
     tolerance: float = 0.0,
     closed: bool = False,
 ) -> list[PositionPath]:
-    """Paths through points; each knot is at one of them, or at the corner that is blended there."""
+    """Paths through points; each knot is at a point, or at the blended corner at it."""
     lengths = chords(points, quaternions)
     if kind in ("line", "polyline") or len(points) == 2:
         lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]
@@ -59,7 +59,7 @@ def through_points(
     curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
     values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)
     position, first, second = (values(s, order) for order in range(3))
-    # The last value comes from the last piece, so that the second derivative of a natural spline is 0 there, too.
+    # Take the last value from the last piece, so that the second derivative of a natural spline is 0 there, too.
     fine = np.concatenate([np.linspace(*ends, SAMPLES, endpoint=False) for ends in itertools.pairwise(s)])
     speeds = np.linalg.norm(values(fine, 1), axis=1)
     if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():

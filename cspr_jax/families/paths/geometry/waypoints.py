@@ -1,4 +1,4 @@
-"""Consecutive motions of any kind: their states at many times, and the smooth parts between their stops."""
+"""Consecutive motions of any kind: states at many times, and smooth parts between stops."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from cspr_jax.errors import InputError
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.shapes import Float, Int
 
-# Samples of a motion, among which stops are sought, and smallest number of samples of a smooth part.
+# Number of samples of a motion in the search for stops, and smallest number of samples of a smooth part.
 SAMPLES, FEWEST = 2000, 8
-AT_REST = 1e-9  # speed over the largest one, below which a motion is at rest
-STEPS = 80  # that refine the time of a stop
-# Radius of curvature at the smallest speed, m, below which the motion counts as turning back.
+AT_REST = 1e-9  # a motion is at rest if its speed over the largest one is below this
+STEPS = 80  # Gauss-Newton steps for the time of a stop
+# A motion turns back if its radius of curvature at the smallest speed is below this, m.
 CUSP = 4e-10
-# Speeds of consecutive motions may differ by this fraction of the largest speed, as rounding.
+# Speeds of consecutive motions may differ by this fraction of the largest speed, due to rounding.
 MEETS = 1e-6
-# Ends of a smooth part are evaluated this fraction of the part inside it, on their own side of a jump.
+# Ends of a smooth part are evaluated inside it by this fraction of the part, so on its own side of a jump.
 INSIDE = 1e-11
 BATCH = 256
 
 
 class SmoothPart(NamedTuple):
-    """Part of a motion over which its acceleration is continuous, and within which it does not stop.
+    """Part of a motion on which its acceleration is continuous, and within which it does not stop.
 
     Fields:
         motion: index of the motion.
-        start: tau.
-        end: tau.
+        start: tau at the start.
+        end: tau at the end.
         at_rest: whether the motion is at rest at the start, and at the end.
     """
 
@@ -42,14 +42,14 @@ class SmoothPart(NamedTuple):
 
 
 class MovingPoints(NamedTuple):
-    """Positions of motions, and derivatives in time.
+    """Positions of motions, and their derivatives in time.
 
     Fields:
-        position: (k, 3) m, of a platform (k, 7) with the unit quaternion behind.
-        first: derivative of the position.
-        second: the second one.
-        velocity: (k, 3) m/s, of a platform (k, 6) with the angular velocity times its radius behind.
-        acceleration: likewise, m/s^2.
+        position: (k, 3) m; for a platform (k, 7), with the unit quaternion last.
+        first: first derivative of `position`.
+        second: second derivative of `position`.
+        velocity: (k, 3) m/s; for a platform (k, 6), with the angular velocity times the platform's radius last.
+        acceleration: as `velocity`, m/s^2.
     """
 
     position: np.ndarray
@@ -60,7 +60,7 @@ class MovingPoints(NamedTuple):
 
     @property
     def speed(self) -> np.ndarray:
-        """Speeds, that of turning included, (k,) m/s."""
+        """Speeds, including those of rotation, (k,) m/s."""
         return np.linalg.norm(self.velocity, axis=1)
 
 
@@ -68,15 +68,15 @@ class MotionSequence:
     """Consecutive motions.
 
     Args:
-        motions: n of them.
-        platform_radius: of the platform, m; unused for a point mass.
+        motions: the n motions.
+        platform_radius: radius of the platform, m; unused for a point mass.
 
     Fields:
         duration: (n,) s.
     """
 
     def __init__(self, motions: Sequence[Motion], platform_radius: float) -> None:
-        """Take the durations."""
+        """Store the motions and their durations."""
         self._motions, self.platform_radius = list(motions), platform_radius
         self.duration = np.array([float(motion.duration()) for motion in motions])
 
@@ -94,7 +94,7 @@ class MotionSequence:
     def inside(
         self, parts: Sequence[SmoothPart], number: Int[np.ndarray, "k"], fraction: Float[np.ndarray, "k"]
     ) -> MovingPoints:
-        """Positions and their derivatives within smooth parts."""
+        """Positions and their derivatives inside smooth parts."""
         motion, start, end = (np.array([part[i] for part in parts])[number] for i in range(3))
         return self.rates(motion.astype(int), start + (end - start) * np.clip(fraction, INSIDE, 1.0 - INSIDE))
 
@@ -120,7 +120,7 @@ class MotionSequence:
         )
 
     def parts(self) -> list[SmoothPart]:
-        """Smooth parts of all motions, in their order, without those in which nothing moves."""
+        """Smooth parts of all motions, in order, without those in which nothing moves."""
         breaks = [np.unique([0.0, *np.asarray(motion.breaks()), 1.0]) for motion in self._motions]
         smooth = [SmoothPart(k, *pair) for k, cuts in enumerate(breaks) for pair in itertools.pairwise(cuts)]
         lengths = np.array([part.end - part.start for part in smooth])
@@ -131,14 +131,14 @@ class MotionSequence:
         rest_speed = AT_REST * speed.max()
         if len(smooth) > 1:
             self._check_meeting(smooth, rest_speed)
-        # Smallest speeds among the samples of one part lie near stops.
+        # Local minima of the speed among samples of one part are near stops.
         is_lowest = (speed[1:-1] <= speed[:-2]) & (speed[1:-1] < speed[2:]) & (number[2:] == number[:-2])
         index = np.flatnonzero(is_lowest) + 1
         fractions, is_stop = self._rest_points(
             smooth, number[index], fraction[index], 1.0 / counts[number[index]], rest_speed
         )
         ends = self.inside(smooth, np.repeat(np.arange(len(smooth)), 2), np.tile([0.0, 1.0], len(smooth)))
-        # Stops at ends are found to within INSIDE of the part.
+        # Stops at ends are located within the fraction INSIDE of the part.
         speed_error = np.linalg.norm(ends.acceleration, axis=1) * np.repeat(self.times(smooth), 2) * INSIDE
         is_end = (ends.speed <= rest_speed + 10.0 * speed_error).reshape(-1, 2)
         split_parts: list[SmoothPart] = []
@@ -169,7 +169,7 @@ class MotionSequence:
     def _rest_points(
         self, smooth: list[SmoothPart], number: np.ndarray, fraction: np.ndarray, width: np.ndarray, rest_speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        # Fractions of parts at which the speed is smallest, by steps of Gauss and Newton, and whether it is a stop.
+        # Return fractions of parts at which the speed is smallest, by Gauss-Newton steps, and whether these are stops.
         if not len(number):
             return fraction, np.zeros(0, bool)
         times, low, high = self.times(smooth)[number], fraction - width, fraction + width
@@ -189,7 +189,7 @@ class MotionSequence:
 
 
 def _product(vector: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    # Products (k, 4) of quaternions, the first of which have no scalar.
+    # Return products (k, 4) of quaternions, of which the first factors have scalar part 0.
     scalar, rest = quaternion[:, :1], quaternion[:, 1:]
     first = -np.sum(vector * rest, axis=1, keepdims=True)
     return np.concatenate([first, scalar * vector + np.cross(vector, rest)], axis=1)

@@ -6,15 +6,15 @@ Files, each importing only from those above it:
     nodes              nodes of sections, and half-planes at both sides of them
     controllable       path speeds from which the end can be reached; the fastest motion on a grid
     interior_point     convex objectives under many linear constraints
-    smooth             the fastest motion whose accelerations do not jump
-    multipliers        multipliers for the lower bound
+    smooth             the fastest motion without jumps of acceleration
+    multipliers        multipliers that make the lower bound close
     discrete           a section on its grid, with margins
-    duality            lower bound of the least time, by intervals
-    bound              the same from a section on its grid
+    duality            lower bound of the least time, by interval arithmetic
+    bound              lower bound from a section on its grid
     timed              motions in time from path speeds
-    tightening         what a motion misses between nodes, and what binds it
-    jumping            the fastest motions of several sections, whose accelerations jump
-    static_tension     tension that keeps a robot from standing still
-    refusals           the point that no path speed passes, and names of half-planes there
+    tightening         limits that a motion breaks between nodes, and criteria that bind it
+    jumping            the fastest motions of many sections, with jumps of acceleration
+    static_tension     tension that prevents a robot from being at rest
+    refusals           the point that no path speed can pass, and names of half-planes there
     least_time         the fastest motion along a section
 """

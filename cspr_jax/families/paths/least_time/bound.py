@@ -23,7 +23,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-# Smallest x at which the search for multipliers begins, over the largest x.
+# The search for multipliers starts from x of at least this fraction of the largest x.
 SMALLEST = 1e-9
 
 
@@ -41,7 +41,7 @@ def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]
 
 @persistent_jit(compiler_options=compile_options.proof_options())
 def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[PathPoints, Array]) -> tuple[Array, Array, Array]:
-    # Multipliers of tensions, cables and the mass centre, from those of the half-planes.
+    # Return multipliers of the wrench and of cable and Cartesian accelerations from those of half-planes.
     def one(point: PathPoints, multipliers: Array) -> tuple[Array, Array, Array]:
         state = state_at(point)
         matrix = unit_wrenches(robot, state).matrix
@@ -60,7 +60,7 @@ def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[PathPoints, Array]) 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
 def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[PathPoints, Array, Array]) -> tuple[Array, Array]:
-    # The cap of a cell is that of the cable, or of the mass centre, that is nearest to its limit in the middle.
+    # The cap of a cell is due to the cable, or the mass centre, that is nearest to its limit in the middle of the cell.
     def one(point: PathPoints, speed_max: Array, multiplier: Array) -> tuple[Array, Array]:
         state = state_at(point)
         none, square = jnp.zeros(robot.n_cables), jnp.maximum(jnp.sum(state.velocity**2), TINY)

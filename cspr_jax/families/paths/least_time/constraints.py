@@ -1,4 +1,4 @@
-"""Half-planes of path acceleration u = s'' and squared path speed x = s'^2 in which a motion along a path stays.
+"""Half-planes of path acceleration u = s'' and squared path speed x = s'^2 that limit a motion along a path.
 
 At one point of a path the acceleration is p' u + p'' x, so that the wrench that the cables must supply is
 a u + b x + r, with the momentum a of a unit path speed, its derivative b along the path, and the weight r. Each face of
@@ -25,23 +25,23 @@ from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
 from cspr_jax.robots.tensions.nearest_face import beside_faces, one_sided_faces
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
 
-# Number of tangents of the largest Cartesian acceleration: half of a polygon around the circle, on the side of p''.
+# Number of tangents to the largest Cartesian acceleration: half a polygon around the circle, on the side of p''.
 TANGENTS = 24
-# Squared norms are raised to this, so that quotients stay finite.
+# Squared norms are at least this, so that quotients stay finite.
 TINY = 1e-30
 StateKind = TypeVar("StateKind", State, StateBounds)
 
 
 class HalfPlanes(NamedTuple):
-    """Half-planes u_coefficient u + x_coefficient x <= bound of one point; those of tensions have no unit.
+    """Half-planes u_coefficient u + x_coefficient x <= bound at one point; those of tensions are dimensionless.
 
     Fields:
-        u: (..., n_rows) coefficient of the path acceleration.
-        x: (..., n_rows) coefficient of the squared path speed.
-        bound: (..., n_rows) bound.
-        margin_loss: (..., n_rows) decrease of the bound for a margin of 1, which is 1 N for tensions and the whole
-            limit for accelerations.
-        cap: (...) largest x that speeds allow, inf for none.
+        u: (..., n_rows) coefficients of the path acceleration.
+        x: (..., n_rows) coefficients of the squared path speed.
+        bound: (..., n_rows) bounds.
+        margin_loss: (..., n_rows) decrease of the bound for a margin of 1: of 1 N for tensions, of the full limit for
+            accelerations.
+        cap: (...) largest x that limits of speeds allow, inf for none.
     """
 
     u: Array
@@ -52,7 +52,7 @@ class HalfPlanes(NamedTuple):
 
 
 def face_count(robot: AnyRobot) -> int:
-    """Number of the half-planes that bound tensions: the first ones."""
+    """Number of half-planes that bound tensions; they come first."""
     return 2 * len(spanning(robot.n_cables, robot.dof))
 
 
@@ -61,8 +61,8 @@ class UnitWrenches(NamedTuple):
 
     Fields:
         matrix: (dof, n_cables) wrenches of unit tensions.
-        momentum: of a unit path speed.
-        momentum_rate: its derivative along the path.
+        momentum: momentum at unit path speed.
+        momentum_rate: derivative of `momentum` along the path.
         rest: wrench that holds the weight.
     """
 
@@ -73,7 +73,7 @@ class UnitWrenches(NamedTuple):
 
 
 def static_state(state: StateKind, *, accelerated: bool) -> StateKind:
-    """State of a path at path speed zero, with a path acceleration of zero or of one."""
+    """State on a path at path speed zero, with path acceleration zero or one."""
     none = state.velocity * 0.0
     changes = {"velocity": none, "acceleration": state.velocity if accelerated else none}
     if state.rotation is not None:
@@ -92,7 +92,7 @@ def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
 
 
 def path_half_planes(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> HalfPlanes:
-    """Half-planes of one point."""
+    """Half-planes at one point."""
     parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
     _, rate, acceleration = cable_motion(robot, state)
@@ -112,8 +112,8 @@ class TensionFaces(NamedTuple):
     """Faces of the set of wrenches that the cables can give, as conditions on tensions t: along t >= minimum.
 
     Fields:
-        along: (n_faces, n_cables) products of the normals, which point inside, with the cables.
-        minimum: (n_faces,) smallest products with tensions within their limits, N; -inf of a face that bounds nothing.
+        along: (n_faces, n_cables) products of the inward normals with the cables' wrenches.
+        minimum: (n_faces,) smallest products for tensions within limits, N; -inf if a face bounds nothing.
     """
 
     along: Array
@@ -133,13 +133,13 @@ def tension_faces(robot: AnyRobot, limits: Limits, matrix: Float[Array, "dof n_c
 
 
 def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
-    # One half-plane a face, over the weight.
+    # Make one half-plane for each face, over the weight.
     faces, weight = tension_faces(robot, limits, wrenches.matrix), robot.mass * robot.gravity
     inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.minimum)
     momentum, momentum_rate, rest = (jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:])
     maximum = rest - jnp.where(bounds, faces.minimum, 0.0) / weight
     margin_loss = jnp.sum(jnp.abs(faces.along), axis=1) / weight
-    # A face without a bound is 0 <= 1.
+    # Replace a face without a bound by 0 <= 1.
     momentum, momentum_rate, margin_loss = (jnp.where(bounds, x, 0.0) for x in (-momentum, -momentum_rate, margin_loss))
     return momentum, momentum_rate, jnp.where(bounds, maximum, 1.0), margin_loss
 

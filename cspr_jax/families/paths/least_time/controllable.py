@@ -1,11 +1,11 @@
-"""Least time along paths on a grid: sets of path speeds from which the end can be reached, and the fastest motion.
+"""Least time along paths on a grid: sets of path speeds from which the end can be reached, and fastest motions.
 
 From the last cell to the first, K = {x : some u in the half-planes of the cell leads into the next K} is an interval
-(Pham and Pham 2018), where h(x) = beta(x) - alpha(x) >= 0: beta, the smallest upper bound of u, less alpha, the largest
-lower one, is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function, and end
-after a few; a derivative that points away from zero proves that K is empty. So no linear program is solved.
+(Pham and Pham 2018) where h(x) = beta(x) - alpha(x) >= 0. Here beta, the smallest upper bound of u, less alpha, the
+largest lower one, is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function,
+and end after a few; a derivative that points away from zero proves that K is empty. So no linear program is needed.
 
-Within a cell u changes at a constant rate, which is chosen in advance; half-planes hold at both ends of each cell.
+Within a cell u changes at a constant rate, chosen in advance; half-planes hold at both ends of each cell.
 Paths are the last axis of all arrays, and are solved together.
 """
 
@@ -23,7 +23,7 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 FLAT = 1e-12  # a half-plane with a smaller coefficient of u bounds x alone
-STEPS = 40  # of Newton, at most
+STEPS = 40  # largest number of Newton steps
 # Rounding error of h, over the largest of its terms.
 CLOSE = 1e-13
 
@@ -33,8 +33,8 @@ class GridCells(NamedTuple):
 
     Fields:
         u: (n_cells, n_rows, n_paths) coefficient of u in the middle of the cell.
-        x: likewise, of x at its start.
-        bound: likewise, bounds.
+        x: (n_cells, n_rows, n_paths) coefficient of x at the start of the cell.
+        bound: (n_cells, n_rows, n_paths) bounds.
         width: (n_cells, n_paths) width of the cells, m.
         cap: (n_cells + 1, n_paths) largest x at the nodes, finite.
     """
@@ -47,7 +47,7 @@ class GridCells(NamedTuple):
 
 
 def _cells_of(sides: tuple[HalfPlanes, HalfPlanes], width: Array, u_rate: Array, cap: Array) -> GridCells:
-    # At the end of a cell x is that at its start and what u in the middle adds.
+    # At the end of a cell, x is its value at the start plus what u in the middle adds.
     start, end = sides
     half = (0.5 * u_rate * width)[:, None]
     return GridCells(
@@ -64,10 +64,10 @@ class GridSolution(NamedTuple):
 
     Fields:
         low: (n_cells + 1, n_paths) smallest x from which the end can be reached; NaN before an empty set.
-        high: likewise, the largest.
+        high: (n_cells + 1, n_paths) largest such x.
         x: (n_cells + 1, n_paths) squared path speeds, 1/s^2 times the unit of s^2.
         u: (n_cells, n_paths) path accelerations in the middle of the cells.
-        empty: (n_paths,) index of the last cell without a controllable x; -1: there is none.
+        empty: (n_paths,) index of the last cell without a controllable x; -1 if all cells have one.
         is_start: (n_paths,) whether the start is controllable.
     """
 
@@ -80,7 +80,7 @@ class GridSolution(NamedTuple):
 
 
 class _Bounds(NamedTuple):
-    # Bounds of u as lines in x, offset - rate x: upper ones, or inf where there is none; lower ones, or -inf.
+    # Bounds of u are lines in x, offset - rate x; `upper` is inf, and `lower` -inf, for no bound.
     upper: Array
     lower: Array
     rate: Array
@@ -95,7 +95,7 @@ def _bounds_of(u: Array, x_coefficient: Array, bound: Array) -> _Bounds:
 
 
 def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
-    # h at x, its derivative, and its rounding error. By reductions alone, since searches for indices are slow.
+    # Return h at x, its derivative, and its rounding error; use reductions alone, since searches for indices are slow.
     upper, lower = bounds.upper - bounds.rate * x[None], bounds.lower - bounds.rate * x[None]
     beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
     falls = jnp.max(jnp.where(upper <= beta[None], bounds.rate, -jnp.inf), axis=0)
@@ -106,7 +106,7 @@ def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
-    # Find the first x from outside where h is not negative; NaN if there is none.
+    # Find the first x from outside at which h is not negative; NaN if there is none.
     def is_open(carry) -> Array:
         _, is_outside, _, step = carry
         return is_outside.any() & (step < STEPS)
@@ -115,7 +115,7 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
         x, is_outside, is_lost, step = carry
         gap, rate, rounding = _gap(bounds, x)
         is_outside &= ~(gap >= -rounding)
-        # No step is possible where the gap is NaN, beyond an empty set. The last x is kept where steps have ended.
+        # No step is possible where the gap is NaN, beyond an empty set. Where steps have ended, keep the last x.
         leads = (gap < 0.0) & (rate * sign < 0.0)
         is_lost |= is_outside & ~leads
         is_outside &= leads
@@ -127,8 +127,8 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
 
 
 def _flat_range(u: Array, x_coefficient: Array, bound: Array, cap: Array) -> tuple[Array, Array]:
-    # Smallest and largest x by the half-planes that do not bound u, and by the cap; if none is possible, the largest
-    # is -1.
+    # Return the smallest and the largest x by the half-planes that do not bound u, and by the cap; the largest is -1 if
+    # none is possible.
     is_flat = jnp.abs(u) <= FLAT
     over = jnp.where(jnp.abs(x_coefficient) > FLAT, x_coefficient, 1.0)
     high = jnp.min(jnp.where(is_flat & (x_coefficient > FLAT), bound / over, jnp.inf), axis=0)
@@ -150,7 +150,7 @@ def fastest(
     start, end = ends
 
     def half_planes_of(cell: GridCells, low: Array, high: Array) -> tuple[Array, Array, Array]:
-        # With the half-planes that lead into the next set.
+        # Add the half-planes that lead into the next set.
         twice, one = 2.0 * cell.width, jnp.ones_like(cell.width)
         u = jnp.concatenate([cell.u, twice[None], -twice[None]])
         x = jnp.concatenate([cell.x, one[None], -one[None]])

@@ -1,4 +1,4 @@
-"""A section of a path on its grid: half-planes at both sides of all cells, with margins, as solvers take them."""
+"""A section of a path on its grid: half-planes at both sides of all cells, with margins, in the form for solvers."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from cspr_jax.families.paths.least_time.smooth import NodeHalfPlanes
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Float
 
-# Path speeds are at most this many times that of a fall along the path.
+# Path speeds are at most this multiple of that of a fall along the path.
 FASTER = 1e2
-# Coefficients of x on both sides of a node count as equal if they differ by less than this.
+# Coefficients of x on both sides of a node count as equal if they differ by less.
 SAME = 1e-6
 
 
 class GridMargins(NamedTuple):
-    """Margins that half-planes keep in each cell, (n_cells,) each.
+    """Margins that half-planes must keep in each cell, (n_cells,) each.
 
     Fields:
-        tension: from both ends of the range of every tension, N.
+        tension: distance of every tension from both ends of its range, N.
         acceleration: fraction of each limit of an acceleration.
         speed: fraction of each limit of a speed.
     """
@@ -37,21 +37,21 @@ class GridMargins(NamedTuple):
     speed: np.ndarray
 
     def at_nodes(self) -> "GridMargins":
-        """At each node the larger of the margins of both cells."""
+        """Margins at nodes: the larger of those of the two adjacent cells."""
         return GridMargins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
 
 
 @dataclasses.dataclass(frozen=True)
 class Discrete:
-    """Section on its grid.
+    """A section on its grid.
 
     Fields:
-        section: NumPy leaves.
-        grid: nodes and speed limits.
+        section: the section, with NumPy leaves.
+        grid: nodes, and limits of speeds.
         start: half-planes at the starts of the cells, (n_cells, n_rows).
-        end: at their ends.
+        end: half-planes at the ends of the cells.
         n_faces: number of half-planes that bound tensions.
-        ends: x at the start and at the end.
+        ends: x at the start and at the end of the section.
         largest: upper bound of all x.
     """
 
@@ -69,12 +69,12 @@ class Discrete:
         return GridMargins(*np.zeros((3, len(self.grid.width))))
 
     def can_rest(self) -> tuple[bool, bool]:
-        """Tell whether tensions within their limits hold the effector at rest."""
+        """Tell whether the effector can rest at the start, and at the end."""
         first, last = ((half_planes.bound[k] >= 0.0).all() for half_planes, k in ((self.start, 0), (self.end, -1)))
         return bool(first), bool(last)
 
     def with_margins(self, margins: GridMargins) -> "Discrete":
-        """The same with tighter half-planes and caps."""
+        """The same section with tighter half-planes and caps."""
         nodes = margins.at_nodes()
         is_tension = np.arange(self.start.bound.shape[1]) < self.n_faces
 
@@ -94,7 +94,7 @@ class Discrete:
         return np.minimum(np.minimum(*both), self.largest)
 
     def node_half_planes(self) -> NodeHalfPlanes:
-        """Half-planes at the nodes; where those of both sides differ, all of them."""
+        """Half-planes at the nodes; all of them where the two sides of a node differ."""
         sides = [np.concatenate([s, e[-1:]]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
         jump = np.abs(self.start.x[1:] - self.end.x[:-1]).max(initial=0.0)
         if jump > SAME * np.abs(self.start.x).max():
@@ -135,7 +135,7 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
 
 
 def _steepness(curve: Spline) -> tuple[float, float]:
-    # Lengths of the path per unit of s, at both ends.
+    # Return lengths of the path per unit of s, at both ends.
     points, knots = np.asarray(curve.position), np.asarray(curve.knots)
     steps = (points[0, 1] - points[0, 0], knots[1] - knots[0]), (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2])
     first, last = ((points.shape[1] - 1) * float(np.linalg.norm(step)) / float(width) for step, width in steps)

@@ -11,9 +11,9 @@ by parts, since u is half of the derivative of x along the path. The time is the
 
     T >= [y . a x / 2] + integral of 1.5 (y . a' - y' . a)^(1/3) + y . r - S(y, s).
 
-The limits of cables' accelerations (a = l') and of the Cartesian one (a = p') are of the same form; a limit of speed
-adds a multiplier times what it leaves. The multipliers of `families.paths.least_time.multipliers` make the bound close;
-any others leave it true. Over each cell all functions are Taylor models (`numerics.bounds.affine_bounds`).
+Limits of cable accelerations (a = l') and of the Cartesian acceleration (a = p') have the same form; a limit of speed
+adds a multiplier times its slack. The multipliers of `families.paths.least_time.multipliers` make the bound close; with
+any others it still holds. Over each cell all functions are Taylor models (`numerics.bounds.affine_bounds`).
 """
 
 import dataclasses
@@ -41,22 +41,22 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 64
-# The bound is lowered by this fraction of the sums, which is more than their rounding errors.
+# The bound is lowered by this fraction of its sums, more than their rounding errors.
 SAFE = 1e-10
-REPAIRS = 12  # rounds in which multipliers are repaired
-SPREAD = 20  # cells on each side whose multipliers change for one that lacks decrease
-SPARE = 1.5  # how much they change together, over the missing decrease
+REPAIRS = 12  # largest number of rounds that repair multipliers
+SPREAD = 20  # cells on each side whose multipliers change to repair a cell
+SPARE = 1.5  # total change of these multipliers over the missing decrease
 DOWN = 2  # axis of forces along gravity
-MORE = 1.01  # how much weight is added, over what is lacking
+MORE = 1.01  # added weight over missing weight
 
 
 class Multipliers(NamedTuple):
     """Multipliers at nodes, linear between them, per metre of path.
 
     Fields:
-        wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
-        cable_acceleration: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
-        acceleration: (n_nodes, 3) of the Cartesian acceleration, likewise.
+        wrench: (n_nodes, dof) multipliers of the wrench balance, over the units of wrenches, s / N.
+        cable_acceleration: (n_nodes, n_cables) multipliers of cable accelerations, s^3 / m; zeros without a limit.
+        acceleration: (n_nodes, 3) multipliers of the Cartesian acceleration, s^3 / m; zeros without a limit.
     """
 
     wrench: Any
@@ -65,11 +65,11 @@ class Multipliers(NamedTuple):
 
 
 class SpeedMultipliers(NamedTuple):
-    """Multipliers of squared speeds, one per cell, per metre of path; none is negative.
+    """Multipliers of squared speeds, one for each cell, per metre of path; none is negative.
 
     Fields:
-        cable: (n_cells, n_cables) s^3 / m^2.
-        mass_centre: (n_cells,) likewise; unused where its speed is not limited.
+        cable: (n_cells, n_cables) multipliers of cable speeds, s^3 / m^2.
+        mass_centre: (n_cells,) multipliers of the mass centre's speed, s^3 / m^2; unused where it is not limited.
     """
 
     cable: np.ndarray
@@ -77,7 +77,7 @@ class SpeedMultipliers(NamedTuple):
 
 
 class _Cell(NamedTuple):
-    # Multipliers at both ends of one cell, its width, and its largest Cartesian speed.
+    # Multipliers at both ends of one cell, the width of the cell, and its largest Cartesian speed.
     start: Multipliers
     end: Multipliers
     rates: SpeedMultipliers
@@ -88,7 +88,7 @@ class _Cell(NamedTuple):
 def lower_bound(
     robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: SpeedMultipliers
 ) -> float:
-    """Lower bound of the time of all motions that go forward along a section, with its speeds at the ends."""
+    """Lower bound of the time of all motions forward along a section, with its speeds at the ends."""
     nodes, curve, speed = path.grid.nodes, path.section.curve, path.grid.speed
     states = curve.bounds(nodes[:-1], nodes[1:])
     width = np.diff(nodes)
@@ -112,7 +112,7 @@ def lower_bound(
 
 
 def _with_weight(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
-    # With enough weight added to y, no cable without a largest tension has a positive product with it.
+    # Add so much weight to y that no cable without a largest tension has a positive product with it.
     wrench = multipliers.wrench.copy()
     lacks = MORE * np.fmax(lacks, 0.0)
     wrench[:, PATTERNS[robot.pattern].forces.index(DOWN)] += np.fmax(np.append(lacks, 0.0), np.insert(lacks, 0, 0.0))
@@ -120,7 +120,7 @@ def _with_weight(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -
 
 
 def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
-    # [y . a x / 2] for the wrench balance, the cables' accelerations and the Cartesian one.
+    # Return [y . a x / 2], summed over the wrench balance, cable accelerations and the Cartesian acceleration.
     total = 0.0
     for node, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
         if x > 0.0:
@@ -138,7 +138,7 @@ def _of_end(robot: AnyRobot, point: PathPoints, wrench: Array, cable_acceleratio
 
 
 def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
-    # Let y decrease more along a in cells where y . a' - y' . a is negative, and less in cells beside them.
+    # Let y decrease more along a in cells where y . a' - y' . a is negative, and less in the cells beside them.
     nodes = np.arange(len(short) + 1)
     fraction = np.zeros(len(nodes))
     for cell in np.flatnonzero(short > 0.0):
@@ -163,26 +163,26 @@ def _line(start: Array, end: Array) -> AffineBounds:
 
 
 def _line_rate(start: Array, end: Array, width: Array) -> AffineBounds:
-    # The derivative of the line between both values.
+    # Return the derivative of the line between both values.
     change = (end - start) / width
     return AffineBounds(change, jnp.zeros_like(change), ROUNDING * jnp.abs(change))
 
 
 def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
-    # Values at both ends of a line that bounds a function from below (-1) or above (1).
+    # Return the values at both ends of a line that bounds a function from below (-1) or from above (1).
     side = bounds.middle + sign * bounds.radius
     return side - bounds.linear, side + bounds.linear
 
 
 def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, rate: AffineBounds) -> AffineBounds:
-    # y . a' - y' . a.
+    # Return y . a' - y' . a.
     return dot(_line(start, end), rate) - dot(_line_rate(start, end, width), momentum)
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
 def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
-    # Tell what each cell adds to the bound, what it takes from it, how much weight its multipliers lack, and by how
-    # much y . a' - y' . a is negative.
+    # Return for each cell the positive and the negative part of its contribution to the bound, the weight that its
+    # multipliers lack, and by how much y . a' - y' . a is negative.
     def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array, Array]:
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
@@ -200,7 +200,7 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
         rate = jnp.where(jnp.isfinite(cell.speed), cell.rates.mass_centre, 0.0)
         twice = twice + 2.0 * rate * norm_squared(state.velocity)
         lost += rate * jnp.square(jnp.where(jnp.isfinite(cell.speed), cell.speed, 0.0))
-        # A concave function of a line is above the line between its values at both ends.
+        # A concave function on a line is above the chord between its values at the ends.
         low, high = _ends(twice, -1.0)
         values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
         short = jnp.maximum(0.0, -jnp.minimum(low, high))
@@ -210,7 +210,7 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
 
 
 def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array, Array]:
-    # y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and what y lacks of weight.
+    # Return y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and the weight that y lacks.
     unit = 1.0 / wrench_units(robot)
     rest, accelerated = static_state(state, accelerated=False), static_state(state, accelerated=True)
     cables = cable_bounds(robot, rest)
@@ -232,7 +232,7 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
     def support_of(value: Array) -> Array:
         return jnp.where(value > 0.0, value * jnp.where(is_bounded, high, 0.0), value * low)
 
-    # A convex function of a line is below the line between its values at both ends.
+    # A convex function on a line is below the chord between its values at the ends.
     sides = [
         jnp.maximum(support_of(up), support_of(down))
         for up, down in zip(_ends(products, 1.0), _ends(products, -1.0), strict=True)
@@ -250,7 +250,7 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
 
 
 def _turning_axes(robot: Any, accelerated: StateBounds, cables: CableBounds) -> AffineBounds:
-    # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
+    # Bound the contribution of axes that turn with the platform to the momentum's derivative: e' . L = e . (L x omega).
     full = balance_bounds(dataclasses.replace(robot, pattern=RIGID), accelerated, cables)[1].each(lambda x: x[3:])
     moment = cross(full, accelerated.angular_acceleration).each(lambda x: x[:, None])
     return balanced_part(robot, accelerated.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

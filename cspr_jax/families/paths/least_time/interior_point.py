@@ -1,22 +1,22 @@
-"""Interior-point method for a convex objective with many linear constraints; the problem solves for the steps.
+"""Interior-point method for a convex objective with many linear constraints; each problem solves for its own steps.
 
-A primal-dual method that needs no feasible start: slacks and multipliers of all constraints stay positive,
-and the products of both fall together (Mehrotra 1992).
+The primal-dual method needs no feasible start: slacks and multipliers of all constraints stay positive, and their
+products decrease together (Mehrotra 1992).
 """
 
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-STEPS = 120  # at most
+STEPS = 120  # largest number of steps
 GAP = 1e-7  # largest duality gap at an optimum, over the objective
-FRACTION = 0.99  # of the distance to a bound that a step may go
-AIM = 0.1  # mean product of slacks and multipliers at which a step aims, over the current one
+FRACTION = 0.99  # fraction of the distance to a bound that a step may go
+AIM = 0.1  # a step aims at this fraction of the mean product of slacks and multipliers
 MISSED, LEVEL = 1e-9, 1e-6  # largest residuals of constraints and of equations at an optimum
 
 
 class Constrained(Protocol):
-    """Problem: minimise an objective of unknowns z, of any shape, where no slack is negative."""
+    """Problem: minimise an objective of unknowns z, of any shape, such that no slack is negative."""
 
     def value(self, z: np.ndarray) -> float:
         """The objective.
@@ -33,7 +33,7 @@ class Constrained(Protocol):
         """
 
     def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Gradient of the Lagrangian, and the residuals of equations, as `z`.
+        """Gradient of the Lagrangian, and residuals of equations, in the shape of `z`.
 
         Args:
             z: unknowns.
@@ -41,7 +41,7 @@ class Constrained(Protocol):
         """
 
     def jt_multipliers(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Transposed Jacobian of minus the slacks, times multipliers, as `z`.
+        """Minus the transposed Jacobian of the slacks, times multipliers, in the shape of `z`.
 
         Args:
             z: unknowns.
@@ -53,7 +53,7 @@ class Constrained(Protocol):
 
         Args:
             z: unknowns.
-            step: as `z`.
+            step: change of the unknowns, in the shape of `z`.
         """
 
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -62,7 +62,7 @@ class Constrained(Protocol):
         Args:
             z: unknowns.
             weights: (m,).
-            right: as `z`.
+            right: right-hand side, in the shape of `z`.
         """
 
     def positive(self, z: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ class Constrained(Protocol):
 
 
 class Optimum(NamedTuple):
-    """Result.
+    """Result of the method.
 
     Fields:
         z: unknowns.
@@ -88,7 +88,7 @@ class Optimum(NamedTuple):
 
 
 def _length(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
-    # Longest step, up to 1, by which no value loses more than a fraction of itself.
+    # Return the longest step, up to 1, in which no value decreases by more than a fraction of itself.
     lengths = [1.0]
     for value, change in pairs:
         falling = change < 0.0
@@ -97,7 +97,7 @@ def _length(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
 
 
 def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
-    """Minimise."""
+    """Minimise the objective of a problem, from unknowns z."""
     slacks = problem.slacks(z)
     slacks = np.maximum(slacks, 0.05)
     multipliers = 0.1 * problem.value(z) / len(slacks) / slacks
@@ -112,7 +112,7 @@ def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
         change = target / slacks - multipliers + weights * missed
         try:
             step = problem.solved(z, weights, -residual - problem.jt_multipliers(z, change))
-        except np.linalg.LinAlgError:  # widths of cells can differ too much for double precision
+        except np.linalg.LinAlgError:  # widths of cells may differ too much for double precision
             break
         slack_step = problem.change(z, step) - missed
         multiplier_step = target / slacks - multipliers - weights * slack_step

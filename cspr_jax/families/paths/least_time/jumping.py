@@ -1,4 +1,4 @@
-"""The fastest motions along sections, whose accelerations jump: of several sections together."""
+"""The fastest motions along sections with jumps of acceleration, for many sections at a time."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
 from cspr_jax.numerics.batches import device_batch_size, padded
 from cspr_jax.numerics.shapes import Float
 
-TOGETHER = 32  # sections that are solved at a time, unless there is only one
-REPEATS = 2  # how often changes of u within cells are taken from a solution
-# Width of a cell, over the mean one, below which the change of u within it is that of a given motion.
+TOGETHER = 32  # number of sections solved at a time, unless there is only one
+REPEATS = 2  # number of times that changes of u within cells are taken from a solution
+# In cells narrower than this fraction of the mean width, u changes as in a given motion.
 NARROW = 0.5
 
 
 class PathAccelerations(NamedTuple):
-    """Path accelerations of a feasible motion along a section, near which a faster one is sought if it is hard to find.
+    """Path accelerations of a feasible motion along a section, near which a faster one is searched for in hard cases.
 
     Fields:
-        coordinate: (k,) s, increasing, m.
+        coordinate: (k,) increasing s, m.
         acceleration: (k,) path acceleration, m/s^2.
     """
 
@@ -43,7 +43,7 @@ class Jumping(NamedTuple):
     Fields:
         run: path speeds and accelerations; None if there is no motion.
         u_rate: (n_cells,) change of u along each cell, over its width.
-        first: solution with u constant in each cell.
+        first: solution with constant u in each cell.
     """
 
     run: PathSpeeds | None
@@ -52,7 +52,7 @@ class Jumping(NamedTuple):
 
 
 def solved_together(paths: Sequence[Discrete], u_rates: Sequence[np.ndarray]) -> list[GridSolution]:
-    """Solutions on the grids of sections."""
+    """Solutions of sections on their grids, in batches of equal shapes."""
     solutions: dict[int, GridSolution] = {}
     groups = defaultdict(list)
     for k, path in enumerate(paths):
@@ -86,7 +86,7 @@ def run_of(solution: GridSolution, path: Discrete, u_rate: Float[np.ndarray, "n_
 def jumping_motions(paths: Sequence[Discrete], guesses: Sequence[PathAccelerations | None] = ()) -> list[Jumping]:
     """The fastest motions along sections.
 
-    Within cells u changes at the rate at which it changes from cell to cell, if such a motion exists.
+    Within cells u changes at the same rate as from cell to cell, if such a motion exists.
     """
     u_rates = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, u_rates)
@@ -118,7 +118,7 @@ def _is_passable(solution: GridSolution) -> bool:
 
 
 def _changes(solution: GridSolution, width: np.ndarray, guessed: np.ndarray | None) -> np.ndarray:
-    # Cells are narrow where the path nearly turns back: there u changes at the given rate.
+    # Cells are narrow where the path almost turns back: there u changes at the given rate.
     change = minmod_rates(np.asarray(solution.u), width)
     return change if guessed is None else np.where(width < NARROW * width.mean(), guessed, change)
 

@@ -1,4 +1,4 @@
-"""Least time along one section of a path: the fastest motion, proved, and a lower bound of all motions' time."""
+"""Least time along one section of a path: the fastest motion, proved, and a lower bound of the time of all motions."""
 
 import dataclasses
 import itertools
@@ -21,15 +21,15 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.runtime.stages import within
 
-ROUNDS = 8  # of proof and tightening
-SHORTER = 4  # how often ramps are halved where no motion with them exists
-# Speed of a motion that counts as slow, over that of a fall along the path.
+ROUNDS = 8  # largest number of rounds of proof and tightening
+SHORTER = 4  # number of times that ramps are halved if no motion with them exists
+# A slow motion has this speed over that of a fall along the path.
 SLOW = 0.01
-FINER = (2, 4)  # factors by which grids become finer where a motion is not proved, or its lower bound is far
-FAR = 0.002  # gap between duration and lower bound, over the duration, above which the bound is far
-STARTS = (0.8, 0.4)  # fractions of x of the motion without ramps from which the search for one with ramps begins
-TANGENTS = 3  # optima, each with tangents at the one before
-# Sections that are solved together.
+FINER = (2, 4)  # factors of finer grids, for motions without a proof or without a close lower bound
+FAR = 0.002  # a lower bound is close if it is below the duration by at most this fraction
+STARTS = (0.8, 0.4)  # the search with ramps starts from these fractions of x of the motion without ramps
+TANGENTS = 3  # number of optima, each with tangents at the previous one
+# Number of sections solved at a time.
 TOGETHER = 64
 
 
@@ -37,11 +37,11 @@ class PhasePlane(NamedTuple):
     """Path speeds of a section, (n_nodes,) each, m/s.
 
     Fields:
-        coordinate: s, m.
+        coordinate: path coordinate s, m.
         low: smallest path speed from which the end can be reached; NaN where there is none.
         high: largest such path speed.
         cap: largest path speed that limits of speeds allow.
-        speed: of the motion; NaN without one.
+        speed: path speed of the motion; NaN without one.
     """
 
     coordinate: np.ndarray
@@ -56,18 +56,18 @@ class LeastTime:
     """The fastest motion along a section.
 
     Fields:
-        motion: over time; its knots are those of the grid; a slow one if none is feasible.
+        motion: motion over time, whose knots are those of the grid; a slow one if none is feasible.
         coordinate: (n_nodes,) s at these knots, m.
-        duration: of it, s.
-        lower_bound: rigorous lower bound of the time of any motion that goes forward along the section, s; NaN where
-            none is proved.
-        jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
-        ramp_time: of the motion, s; 0 where its accelerations jump.
+        duration: duration of the motion, s.
+        lower_bound: rigorous lower bound of the time of any motion forward along the section, s; NaN if none is
+            proved.
+        jumping: duration of the fastest motion without ramps on the same grid, without margins, s.
+        ramp_time: time of ramps of the motion, s; 0 if its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.
-        names: of the criteria that can bind.
-        binds: (n_cells,) index of the one that binds in each cell; -1: none.
+        names: names of the criteria that can bind.
+        binds: (n_cells,) index of the criterion that binds in each cell; -1: none.
         feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
-        plane: path speeds.
+        plane: path speeds that are possible along the section.
         failure: why there is no motion, or None.
     """
 
@@ -95,7 +95,7 @@ def least_time_motion(
 def least_times_along(
     problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
 ) -> Iterator[LeastTime]:
-    """Find the fastest motions along sections, part by part, and announce the progress."""
+    """Find the fastest motions along sections, in groups whose progress is announced."""
     count, progress = len(sections), RateEstimate()
     for first in range(0, count, batch):
         progress.advance(first, count)
@@ -117,7 +117,7 @@ def least_time_motions(
     cases = zip(paths, jumping_motions(paths, guesses), settings, strict=True)
     answers = together(problem, [_proved(problem, *case) for case in cases])
     for finer in FINER:
-        # A motion that is not proved on its grid, or not found, may be on a finer one.
+        # A finer grid may give a motion, or its proof, where this one does not.
         unmet = [k for k, (_, is_met) in enumerate(answers) if not is_met]
         if not unmet:
             break
@@ -132,8 +132,8 @@ def least_time_motions(
 def _proved(
     problem: Problem, path: Discrete, start: Jumping, settings: SectionSettings
 ) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
-    # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
-    # and receives the bounds of their slacks.
+    # Tighten the limits on the grid until the motion keeps them everywhere; return whether it does. The generator
+    # yields motions, and receives the bounds of their slacks.
     jumping, u_rate, first = start
     if jumping is None:
         return _without_motion(problem, path, first), False
@@ -172,7 +172,7 @@ def _proved(
 
 
 def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.ndarray, duration: float) -> float:
-    # From finer grids where the lower bound is not close to the duration.
+    # Refine the grid while the lower bound is not close to the duration.
     bound = path_bound(problem, path, x)
     for finer in FINER:
         if bound >= (1.0 - FAR) * duration:
@@ -183,7 +183,7 @@ def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.nd
 
 
 def _plane(path: Discrete, solution: GridSolution, speed: np.ndarray) -> PhasePlane:
-    with np.errstate(invalid="ignore"):  # of the square roots of unknown speeds
+    with np.errstate(invalid="ignore"):  # square roots of unknown speeds are NaN
         low, high = np.sqrt(solution.low), np.sqrt(solution.high)
     cap = path.cap()
     return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
@@ -209,7 +209,7 @@ def _without_motion(problem: Problem, path: Discrete, solution: GridSolution) ->
 
 
 def _slow(path: Discrete) -> PathSpeeds:
-    # A slow motion, whose tensions are about those at rest, to be shown where none is feasible.
+    # Return a slow motion, with tensions close to those at rest, to show where none is feasible.
     fraction = path.grid.nodes / path.grid.nodes[-1]
     bump = 4.0 * SLOW**2 * path.largest / FASTER**2
     x = (1.0 - fraction) * path.ends[0] + fraction * path.ends[1] + bump * fraction * (1.0 - fraction)
@@ -219,7 +219,7 @@ def _slow(path: Discrete) -> PathSpeeds:
 
 
 def _ramped(path: Discrete, jumping: PathSpeeds, ramp_time: float) -> tuple[PathSpeeds, float]:
-    # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
+    # Return the fastest motion with ramps, halved while there is none, and the largest path jerk.
     if ramp_time > 0.0:
         rests = path.can_rest()
         ends = SectionEnds(path.ends, (rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0))
@@ -242,7 +242,7 @@ def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, tim
 
 
 def _slower(path: Discrete, run: PathSpeeds, u_rate: np.ndarray, jerk: float) -> PathSpeeds | None:
-    # The fastest motion within tighter limits.
+    # Return the fastest motion within tighter limits.
     if not np.isfinite(jerk):
         return again([path], [u_rate])[0]
     start = Smooth(run.x, np.append(run.before, run.after[-1]))

@@ -1,9 +1,9 @@
-"""Multipliers that make the lower bound of the least time close: those of a discrete problem whose dual is the bound.
+"""Multipliers that make the lower bound of the least time close: those of a discrete problem with this bound as dual.
 
 With multipliers that are linear between nodes, the bound of `families.paths.least_time.duality` is the dual of a
-problem in which x = s'^2 is constant in each cell, and half-planes hold at the nodes, where u is the difference of both
-cells' x over their widths, and x their mean. Its only unknowns are the cells' x: an interior-point method with a
-tridiagonal matrix.
+problem in which x = s'^2 is constant in each cell. Half-planes hold at the nodes, where u is the difference of x in the
+adjacent cells over the cells' widths, and x is their mean. The only unknowns are x of the cells, so an interior-point
+method needs only a tridiagonal matrix.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from scipy.linalg import solveh_banded
 from cspr_jax.families.paths.least_time.interior_point import interior_point
 from cspr_jax.numerics.shapes import Float
 
-# Fractions of the x of a motion from which the search begins, tried one after the other: near limits it may get stuck.
+# The search starts from these fractions of the x of a motion, in order: near limits it may get stuck.
 STARTS = (0.8, 0.4, 1.0)
 
 
 class SideHalfPlanes(NamedTuple):
     """Half-planes at the nodes, u_coefficient u + x_coefficient x <= bound, and caps of the cells.
 
-    Where both sides of a node differ, it has the half-planes of both.
+    Where the two sides of a node differ, the half-planes of both hold.
 
     Fields:
-        u: (n_rows, n_nodes).
-        before: (n_rows, n_nodes) coefficient of x at the end of the cell before.
-        after: likewise, at the start of the cell after.
-        bound: (n_rows, n_nodes).
-        cap: (n_nodes - 1,) largest x.
-        width: (n_nodes - 1,) m.
+        u: (n_rows, n_nodes) coefficients of u.
+        before: (n_rows, n_nodes) coefficients of x at the end of the previous cell.
+        after: (n_rows, n_nodes) coefficients of x at the start of the next cell.
+        bound: (n_rows, n_nodes) bounds.
+        cap: (n_nodes - 1,) largest x of each cell.
+        width: (n_nodes - 1,) widths of the cells, m.
     """
 
     u: np.ndarray
@@ -45,7 +45,7 @@ class SideHalfPlanes(NamedTuple):
 def dual_multipliers(
     half_planes: SideHalfPlanes, ends: tuple[float, float], start: Float[np.ndarray, "n_nodes-1"]
 ) -> tuple[Float[np.ndarray, "n_rows n_nodes"], Float[np.ndarray, "n_nodes-1"]]:
-    """Multipliers of the half-planes, and of the caps."""
+    """Multipliers of the half-planes and of the caps."""
     problem = _Staggered(half_planes, ends)
     for fraction in STARTS:
         optimum = interior_point(problem, fraction * start)
@@ -56,7 +56,7 @@ def dual_multipliers(
 
 
 class _Staggered:
-    # Constraints at nodes are of the x before and after: before x0 + after x1 <= bound; those of cells x / cap <= 1.
+    # Constraints at nodes: before x0 + after x1 <= bound, with x of the adjacent cells; those of cells: x / cap <= 1.
     def __init__(self, half_planes: SideHalfPlanes, ends: tuple[float, float]) -> None:
         self.width, self.cap = half_planes.width, half_planes.cap
         sides = np.concatenate([[0.0], self.width]), np.concatenate([self.width, [0.0]])

@@ -1,4 +1,4 @@
-"""Nodes of a section of a path, and the half-planes that limits make of path speed and acceleration on both sides."""
+"""Nodes of a section of a path, and the half-planes of path speed and acceleration on both sides of them."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-RAMP = 0.25  # fraction of the nodes over which cells become wider, from an end at zero speed on
-SMALLER = 5  # cells beside such an end that are narrower still
-BATCH, MANY = 64, 512  # points computed at a time, of one section and of many
-DEGREE = 5  # of all pieces: those of a lower degree are raised, so that all sections share what is compiled
-# A node that is nearer to the end of a piece than this part of its width lies there.
+RAMP = 0.25  # cells become wider over this fraction of the nodes, from an end at zero speed
+SMALLER = 5  # number of even narrower cells at such an end
+BATCH, MANY = 64, 512  # number of points computed at a time, for one section and for many
+DEGREE = 5  # degree to which all pieces are raised, so that all sections share compiled programs
+# A node counts as the end of a piece if its distance from it is below this fraction of the piece.
 NEAR = 1e-9
 
 
 class PathGrid(NamedTuple):
-    """Nodes of one section.
+    """Nodes of a section.
 
     Fields:
-        nodes: (n_cells + 1,) path coordinates, m; there is one at each knot of the section, and where accelerations or
-            speed limits jump.
+        nodes: (n_cells + 1,) path coordinates, m; they include all knots of the section, and all jumps of accelerations
+            and of speed limits.
         speed: (n_cells,) largest speed of the mass centre in each cell, m/s, inf for none.
-        feed: (n_cells,) largest speed that the section itself allows, m/s, inf where the robot's limit is lower.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf if the robot's limit is lower.
     """
 
     nodes: np.ndarray
@@ -53,10 +53,10 @@ class PathPoints(NamedTuple):
     """Points on pieces of a section, (k, ...) each.
 
     Fields:
-        position: (k, 6, 3) Bernstein coefficients of their pieces, m.
-        quaternion: (k, 6, 4) likewise; None for a point mass.
-        fraction: (k,) position of the point in its piece, from 0 to 1.
-        width: (k,) of the pieces, m.
+        position: (k, 6, 3) Bernstein coefficients of positions on their pieces, m.
+        quaternion: (k, 6, 4) Bernstein coefficients of quaternions; None for a point mass.
+        fraction: (k,) fraction of the piece at which the point lies, from 0 to 1.
+        width: (k,) widths of the pieces, m.
         offset: (k, 3) as in `Spline`, or None.
     """
 
@@ -68,7 +68,7 @@ class PathPoints(NamedTuple):
 
 
 def grid_of(section: Section, count: int, slow: tuple[bool, bool], speed_max: float = np.inf) -> PathGrid:
-    """Nodes of a section: close together where it is slow, as times of a motion that speeds up and slows down are."""
+    """Nodes of a section, spaced like times of a motion that speeds up and slows down: close together at slow ends."""
     knots = np.asarray(section.curve.knots)
     nodes = knots[-1] * _fractions(count, slow)
     changes = knots[1:-1][section.speed[1:] != section.speed[:-1]]
@@ -88,7 +88,7 @@ def _pieces(knots: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _fractions(count: int, slow: tuple[bool, bool]) -> np.ndarray:
-    # The cells at slow ends are divided again, each a quarter as wide as the next.
+    # Divide the cells at slow ends again, each a quarter as wide as the next.
     more = SMALLER if count > 8 * SMALLER else 0
     fractions = _distance_at(np.linspace(0.0, 1.0, count + 1 - more * sum(slow)), slow)
     parts = 0.25 ** np.arange(more, 0, -1)
@@ -98,7 +98,7 @@ def _fractions(count: int, slow: tuple[bool, bool]) -> np.ndarray:
 
 
 def _distance_at(time: np.ndarray, slow: tuple[bool, bool]) -> np.ndarray:
-    # Distance of a motion whose speed rises during a fraction of its time from a slow end, and falls towards one.
+    # Return the distance of a motion whose speed rises for a fraction of its time from a slow end, and falls to one.
     before, after = (RAMP if end else 0.0 for end in slow)
     distance, left = time - 0.5 * before, 1.0 - time
     total = 1.0 - 0.5 * before - 0.5 * after
@@ -122,7 +122,7 @@ def points_on(curve: Spline, coordinates: Float[np.ndarray, "k"], *, ahead: bool
 
 
 def _raised(coefficients: np.ndarray) -> np.ndarray:
-    # The same pieces as polynomials of a higher degree.
+    # Write the same pieces as polynomials of a higher degree.
     while coefficients.shape[1] <= DEGREE:
         degree = coefficients.shape[1]
         fractions = (np.arange(1, degree) / degree)[:, None]
@@ -132,7 +132,7 @@ def _raised(coefficients: np.ndarray) -> np.ndarray:
 
 
 def state_at(point: PathPoints) -> State:
-    """State of a path that is run along at a unit path speed, at one point."""
+    """State at one point of a path that is traversed at unit path speed."""
     return piece_state(*point)
 
 
@@ -147,7 +147,7 @@ def side_half_planes(
     """Half-planes at the starts and at the ends of the cells of several sections."""
     points, speeds, jumps_of_grids = [], [], []
     for curve, grid in zip(curves, grids, strict=True):
-        # One computation is enough for both sides of a node, except where something jumps.
+        # Compute only one side of each node, and the other one where something jumps.
         jumps = np.flatnonzero(np.isin(grid.nodes, curve.jumps()) | np.pad(grid.speed[1:] != grid.speed[:-1], 1))
         points += [
             points_on(curve, grid.nodes[:-1], ahead=True),
@@ -171,7 +171,7 @@ def side_half_planes(
 
 
 def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarray:
-    # Values at the ends of cells: those at the starts of the next cells, except where they jump, and at the last node.
+    # Values at the ends of cells are those at the starts of the next cells, except at jumps and at the last node.
     end = np.concatenate([start[1:], before[-1:]])
     end[jumps - 1] = before[:-1]
     return end

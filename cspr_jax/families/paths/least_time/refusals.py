@@ -1,4 +1,4 @@
-"""Why no motion runs along a section: the point that no path speed passes, or the end whose speed is not possible."""
+"""Why no motion runs along a section: a point that no path speed can pass, or an end whose speed is not possible."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 FLAGS = {row.name: row.flag for row in LIMITS}
-# Flag of a criterion, and its cable from 0 on, or None.
+# Flag of a criterion, and index of its cable, or None.
 HalfPlaneName = tuple[Verdict, int | None]
 
 
 def half_plane_names(
     problem: Problem, state: State, u: Float[np.ndarray, "n_rows"], x: Float[np.ndarray, "n_rows"]
 ) -> list[HalfPlaneName]:
-    """Names of the half-planes of one point, in the order of `constraints.path_half_planes`."""
+    """Names of the half-planes at one point, in the order of `constraints.path_half_planes`."""
     robot, limits = problem.robot, problem.limits
     names = _of_faces(problem, state, np.stack([u, x], axis=1))
     if limits.cable_acceleration_max is not None:
@@ -39,8 +39,8 @@ def half_plane_names(
 
 
 def _of_faces(problem: Problem, state: State, coefficients: np.ndarray) -> list[HalfPlaneName]:
-    # On as many cables as degrees of freedom all cables but one span a face, on which the tension of that one is the
-    # smallest where the half-plane has it with the other sign, else the largest.
+    # With as many cables as degrees of freedom, all cables but one span a face. The half-plane of this face limits the
+    # tension of that cable: from below if it has the opposite sign, else from above.
     robot = problem.robot
     count = face_count(robot)
     if robot.n_cables > robot.dof:
@@ -56,24 +56,24 @@ def _of_faces(problem: Problem, state: State, coefficients: np.ndarray) -> list[
     ]
 
 
-# Name of what is no half-plane of a point: speeds from which the rest of the path can be run along.
+# Name for the path speeds from which the rest of the path can be run along, which are no half-plane of a point.
 REST_OF_PATH = None
 
 
 class NoMotion(NamedTuple):
-    """Why a section cannot be run along.
+    """Why no motion runs along a section.
 
     Fields:
-        coordinate: s of the point at which it fails, m.
-        position: (3,) the point, in the axes of the kernels, m.
-        names: what needs a path acceleration there, and what forbids it: flags and cables; None for the speeds from
-            which the rest of the path can be run along; () where the speed at an end is refused.
-        needed: this acceleration, m/s^2; at an end the speed that is refused, m/s.
-        allowed: the largest acceleration that the other one leaves, m/s^2; at an end the possible speed that is
-            nearest, m/s.
-        end: "start" or "end" where the speed there is not possible, else "".
-        speeds: smallest and largest possible speed of such an end, m/s.
-        static_tension: tension that keeps the robot from standing still there; None: it can.
+        coordinate: s of the point that no motion can pass, m.
+        position: (3,) this point, in the axes of the kernels, m.
+        names: flags and cables of the criterion that needs a path acceleration at the point, and of the one that
+            forbids it; None for the rest of the path, which limits the speed; () if the speed at an end is refused.
+        needed: this acceleration, m/s^2; at an end the refused speed, m/s.
+        allowed: the acceleration nearest to it that the other criterion allows, m/s^2; at an end the nearest possible
+            speed, m/s.
+        end: "start" or "end" if the speed there is not possible, else "".
+        speeds: smallest and largest possible speed at such an end, m/s.
+        static_tension: tension that prevents rest at the point; None if the robot can rest there.
     """
 
     coordinate: float
@@ -87,18 +87,18 @@ class NoMotion(NamedTuple):
 
 
 def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotion:
-    """Tell why there is no motion."""
+    """Tell why there is no motion along a section."""
     cell, n_cells = int(solution.empty), len(path.grid.width)
     node = max(cell, 0)
     state = _state(path, node)
     position = np.asarray(state.position)
-    # A body that turns on the spot has no acceleration along its path in m/s^2.
+    # A body that only turns has no path acceleration in m/s^2.
     scale, coordinate = float(np.linalg.norm(state.velocity)) or np.nan, float(path.grid.nodes[node])
     static = _static_tension(problem, path, node)
     if 0 <= cell < n_cells:
         needed, allowed, indices = _contradiction(path, solution, cell)
         half_planes = half_plane_names(problem, state, *(np.asarray(fraction[cell]) for fraction in path.start[:2]))
-        # Half-planes of both ends of a cell follow each other; those beyond lead into the next set.
+        # Indices count the half-planes at both ends of a cell; larger ones are those that lead into the next set.
         names = tuple(half_planes[k % len(half_planes)] if k < 2 * len(half_planes) else REST_OF_PATH for k in indices)
         return NoMotion(coordinate, position, names, scale * needed, scale * allowed, static_tension=static)
     is_start = cell < 0
@@ -115,15 +115,15 @@ def _state(path: Discrete, node: int) -> State:
 
 
 def _static_tension(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
-    # The tension at the point itself, or else at an end at which the motion is to rest.
+    # Return the tension that prevents rest at the node itself, or else at an end where the motion is to rest.
     ends = [end for end, x in zip((0, len(path.grid.width)), path.ends, strict=True) if x == 0.0]
     tensions = (static_tension(problem, _state(path, each)) for each in (node, *ends))
     return next((tension for tension in tensions if tension is not None), None)
 
 
 def _contradiction(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:
-    # The path speed that is nearest to possible: the path acceleration that one half-plane needs there, the largest
-    # one that another leaves, and their numbers.
+    # At the path speed that is closest to possible, return the path acceleration that one half-plane needs, the largest
+    # one that another allows, and the indices of both.
     start, end, twice = path.start, path.end, 2.0 * float(path.grid.width[cell])
     u = np.concatenate([start.u[cell], end.u[cell] + twice * end.x[cell], [twice, -twice]])
     x = np.concatenate([start.x[cell], end.x[cell], [1.0, -1.0]])
@@ -137,7 +137,7 @@ def _contradiction(path: Discrete, solution: GridSolution, cell: int) -> tuple[f
     values = (maximum - x * best) / over
     upper, lower = np.where(u > FLAT, values, np.inf), np.where(u < -FLAT, values, -np.inf)
     minimum, largest = int(lower.argmax()), int(upper.argmin())
-    if upper[largest] >= lower[minimum]:  # a half-plane that does not bound the path acceleration forbids the point
+    if upper[largest] >= lower[minimum]:  # the half-plane that forbids the point does not bound u
         alone = int(np.where(np.abs(u) > FLAT, np.inf, maximum - x * best).argmin())
         return np.nan, np.nan, (alone,)
     return float(lower[minimum]), float(upper[largest]), (minimum, largest)

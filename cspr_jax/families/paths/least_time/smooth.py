@@ -1,4 +1,4 @@
-"""Least time along a path with a continuous path acceleration, whose rate of change (the path jerk) is limited.
+"""Least time along a path with a continuous path acceleration, whose rate of change (path jerk) is limited.
 
 Between nodes u = s'' changes at a constant rate along the path, so that x = s'^2 is quadratic there. The time is a
 convex function of x, and the half-planes at the nodes are linear in u and x (Verscheure et al. 2009): an interior-point
@@ -19,21 +19,21 @@ from cspr_jax.families.paths.least_time.interior_point import interior_point
 from cspr_jax.numerics.shapes import Float
 
 BANDWIDTH = 4  # diagonals below and above the main one, with three unknowns for each node
-REGULAR = 1e-14  # added to the diagonal, so that the matrix is regular
-SMALLEST = 1e-12  # smallest x from which the search starts, over the largest
-# The half-planes nearest to a motion replace all, so many on each side of u, both at its x and at a fraction of its x.
+REGULAR = 1e-14  # regularization, added to the diagonal
+SMALLEST = 1e-12  # smallest x of the start, over the largest x
+# Instead of all half-planes, this many nearest ones bound u on each side, at a motion's x and at a fraction of it.
 NEAREST, SLOWER = 6, 0.8
 FLAT = 1e-12  # a half-plane with a smaller coefficient of u bounds x alone
-MISSED = 1e-9  # by which other half-planes may be broken
-MORE_ROWS = 4  # times that broken ones are added
+MISSED = 1e-9  # other half-planes may be broken by this much
+MORE_ROWS = 4  # number of times that broken half-planes are added
 
 
 class SectionEnds(NamedTuple):
     """Start and end of a section.
 
     Fields:
-        speeds: squared path speeds, (m/s)^2.
-        rests: whether the path acceleration vanishes too.
+        speeds: squared path speeds at the start and at the end, (m/s)^2.
+        rests: whether the path acceleration vanishes at the start, and at the end.
     """
 
     speeds: tuple[float, float]
@@ -44,11 +44,11 @@ class NodeHalfPlanes(NamedTuple):
     """Half-planes at the nodes, as in `constraints.HalfPlanes`, and x <= cap.
 
     Fields:
-        u: (n_rows, n_nodes).
-        x: (n_rows, n_nodes).
-        bound: (n_rows, n_nodes).
-        cap: (n_nodes,) finite.
-        width: (n_nodes - 1,) m.
+        u: (n_rows, n_nodes) coefficients of u.
+        x: (n_rows, n_nodes) coefficients of x.
+        bound: (n_rows, n_nodes) bounds.
+        cap: (n_nodes,) largest x, finite.
+        width: (n_nodes - 1,) widths of the cells, m.
     """
 
     u: np.ndarray
@@ -58,7 +58,7 @@ class NodeHalfPlanes(NamedTuple):
     width: np.ndarray
 
     def nearest(self, x: Float[np.ndarray, "n_nodes"]) -> "NodeHalfPlanes":
-        """The half-planes that bound u most, from either side, about a motion; duplicates among them."""
+        """The half-planes nearest to a motion, from either side of u; some may be duplicates."""
         if len(self.u) <= 4 * NEAREST:
             return self
         chosen = []
@@ -84,7 +84,7 @@ class NodeHalfPlanes(NamedTuple):
         Float[np.ndarray, "n_rows+1 n_nodes"],
         Float[np.ndarray, "n_rows+1 n_nodes"],
     ]:
-        """Half-planes with the cap as the last one."""
+        """Half-planes with the cap as the last of them."""
         ones = np.ones((1, len(self.cap)))
         pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.bound, ones)
         u, x, maximum = (np.concatenate(pair) for pair in pairs)
