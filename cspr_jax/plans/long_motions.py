@@ -30,7 +30,7 @@ from cspr_jax.verification.attained import attained
 from cspr_jax.verification.proved_answers import MotionProof, answers_of, proof_of
 from cspr_jax.verification.time_proof import TimeProof
 
-# Of these quantities the smallest value of the motion counts, of all others the largest.
+# The smallest value of these quantities counts, of all others the largest.
 SMALLEST = ("tension_min", "mu_min", "depth_min", "tension_margin", "are_found")
 
 

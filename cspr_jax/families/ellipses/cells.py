@@ -82,7 +82,7 @@ def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.nda
         verdict = np.where(has_frequency, FLAGS(Verdict.UNDECIDED.value), FLAGS(Verdict.NOT_FINITE.value))
         margin, binding = nothing, np.zeros(count, int)
     else:
-        # Where no frequency is feasible, any frequency shows what fails: take the natural one.
+        # If no frequency is feasible, any frequency shows what fails: take the natural one.
         margins, rounding = _margins(hull, robot, ellipses, np.where(has_frequency, used, np.nan_to_num(natural)))
         verdict = _verdict(robot, margins, rounding)
         margin = np.where(has_frequency, margins.min(1), np.nan)

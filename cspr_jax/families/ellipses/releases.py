@@ -36,11 +36,11 @@ from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_
 SHORTEST = 0.01
 LONGEST = 100.0
 GRID = 257
-COARSE_GRID = 33  # times of flight for each number of arcs
-HALVINGS = 40  # of an interval that holds an end of the feasible times
-PROVED_HALVINGS = 24  # of such an interval, by proofs
-PASSES = 8  # grids, each about the best time of the one before
-# Distances from an end of the feasible times that are tried, over the distance to their middle.
+COARSE_GRID = 33  # number of times of flight tried for each number of arcs
+HALVINGS = 40  # bisections for an end of the feasible times
+PROVED_HALVINGS = 24  # bisections for such an end, by proofs
+PASSES = 8  # number of grids, each about the best time of the previous one
+# Distances tried from an end of the feasible times, over the distance from the end to their middle.
 INSIDE = (1e-3, 1e-2, 1e-1)
 SAMPLES = 256  # samples of a transfer
 # Frequencies are searched for from 1 / WIDEST to WIDEST times the natural one.
@@ -61,9 +61,9 @@ class Release(Turning):
 class ReleaseRequirement(NamedTuple):
     """Requirements of a release.
 
-    scene: bodies that can touch each other.
+    Fields:
         problem: robot and limits.
-        scene: bodies that can meet.
+        scene: bodies that can touch each other.
         parabola: flight of the object.
         centre: (3,) centre of the ellipse, from the centroid of the spools, z down, m.
         turns: number of turns on the ellipse before the release.
@@ -149,7 +149,7 @@ class _Times:
             self._find_one()
 
     def _find_one(self) -> None:
-        # Between the times of the grid the one with the largest slack may be feasible, or touch the limits.
+        # Search between the times of the grid: the one with the largest slack may be feasible, or touch the limits.
         grid, slacks = self._grid, self._slacks
         for _ in range(PASSES):
             at = int(slacks.argmax())
@@ -203,7 +203,7 @@ class _Times:
         return self.of_least_energy(before, arcs) if best is None else self._touched(before, *best)
 
     def _earliest(self, before: Turning, grid: np.ndarray, number: int) -> tuple[float, float] | None:
-        # The shortest time of flight whose transfer, with this number of arcs, is proved, and the end of such times.
+        # Return the shortest proved time of flight with this number of arcs, and the end of such times.
         def slack(times: np.ndarray) -> np.ndarray:
             problem, scene = self._allowed.problem, self._allowed.scene
             proofs = [sampled_proof(problem, self._transfer(before, t, number), scene, SAMPLES) for t in times.tolist()]
@@ -226,11 +226,11 @@ class _Times:
         return None
 
     def _touched(self, before: Turning, time: float, end: float, number: int) -> float:
-        # A proved time beside an end, or the end itself where limits alone set it: they may be touched.
+        # Return a proved time beside an end, or, where only limits set the end, the end itself: they may be touched.
         problem, mirrored = self._requirement.problem, 2.0 * end - time
         if problem.limits.uncertainty is not None:
             return time
-        # Proofs take limits that much wider.
+        # Narrow the limits by as much as proofs widen them.
         limits = jax.tree.map(lambda limit, wide: 2.0 * limit - wide, problem.limits, self._touching.problem.limits)
         aimed_at = problem._replace(limits=limits)
 
@@ -269,7 +269,7 @@ class _Times:
 
 
 def _narrowed(slack: Callable, inside: float, outside: float, halvings: int = HALVINGS) -> float:
-    # The end of the feasible times between a feasible and an infeasible one.
+    # Return the end of the feasible times between a feasible and an infeasible time.
     for _ in range(halvings):
         middle = 0.5 * (inside + outside)
         inside, outside = (middle, outside) if slack(np.array([middle]))[0] > 0.0 else (inside, middle)

@@ -29,11 +29,11 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-SHORTEST = 0.003  # time of flight, over the longest one
-GRID = 513  # times of flight
-AROUND = 33  # times of each narrower grid about the best one
-NARROWED = 8  # how often
-# Fraction of the depth of its centre that an ellipse keeps from the plane of the spools.
+SHORTEST = 0.003  # shortest time of flight over the longest one
+GRID = 513  # number of times of flight tried first
+AROUND = 33  # number of times in each narrower grid about the best one
+NARROWED = 8  # number of narrower grids
+# Ellipses keep this fraction of the depth of their centre to the plane of the spools.
 KEPT = 1e-6
 # Bound of the rounding errors of margins.
 MARGIN_ERROR = 1e-13
@@ -72,7 +72,7 @@ class _Cells(NamedTuple):
 
 
 class _Space(NamedTuple):
-    # Normal of the plane of the spools, gravity, box of releases, depth of the floor, and by how much it may be missed.
+    # Normal of the spool plane, gravity, box of releases, depth of the floor, and by how much it may be missed.
     normal: np.ndarray
     gravity: float
     box: ReleaseBox
@@ -149,7 +149,7 @@ def _sampled(space: _Space, cells: _Cells, times: np.ndarray) -> _Samples:
     corners = np.sort(np.stack([low * normal, high * normal]), axis=0).sum(1)
     depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners, cells.depth * (1.0 - KEPT))
     height = space.floor - cells.centre[:, 2]
-    # A floor may be touched, also by a swing that has no other height.
+    # A floor may be touched, even by a swing that stays at this height.
     inner = np.where(height > space.missed, height, height + space.missed)
     heights = _interval(cells.centre[:, 2], fallen[..., 2], fraction, height, (low[2], high[2]), inner)
     first, last = (np.broadcast_to(side, fallen.shape).copy() for side in (low, high))
@@ -173,7 +173,7 @@ class _Interval(NamedTuple):
 def _interval(
     centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, radius: np.ndarray, box, inner: np.ndarray
 ) -> _Interval:
-    # The p for which (p - centre)^2 + fraction (fallen - p)^2 is at most the square of the inner radius.
+    # Return the interval of p where (p - centre)^2 + fraction (fallen - p)^2 is at most the squared inner radius.
     middle = (centre[:, None] + fraction * fallen) / (1.0 + fraction)
     away, inner = fallen - centre[:, None], inner[:, None]
     square = inner**2 / (1.0 + fraction) - fraction * away**2 / (1.0 + fraction) ** 2
@@ -217,7 +217,7 @@ def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
     times = np.geomspace(SHORTEST, 1.0, GRID) * longest[:, None] / cells.frequency
     has_floor = np.isfinite(space.floor)
     if has_floor:
-        # Just above the floor swings are level, and the object falls from there: all other times may be infeasible.
+        # Just above the floor only level swings are possible; add the time in which an object falls from them.
         level = np.sqrt(2.0 * np.maximum(cells.target[:, 2] - cells.centre[:, 2], 0.0) / space.gravity)[:, None]
         times = np.sort(np.append(times, np.where(level > 0.0, level, times[:, :1]), axis=1), axis=1)
     samples, each = _sampled(space, cells, times), np.arange(len(drop))

@@ -28,23 +28,23 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.stages import amount, stage
 from cspr_jax.verification.proved_answers import proved_answers
 
-# Directions of a motion that runs on through a pose differ by no more.
+# Directions of a motion that continues through a pose may differ by this much.
 SAME_DIRECTION = 1e-6
-# Sections that are solved one by one, at most; more are solved together.
+# Up to this many sections are solved one by one, more of them together.
 FEW = 16
-# Cells of the grids of all sections: a proof takes no more blocks.
+# Largest number of cells in the grids of all sections, as proofs handle no more blocks.
 MOST_CELLS = 100_000
-# With more cells than this, their number is announced before the work begins.
+# Numbers of cells above this are announced before the work starts.
 MANY_CELLS = 10_000
 
 
 class PathRun(NamedTuple):
-    """Poses that one path joins.
+    """Consecutive poses that one path joins.
 
     Fields:
-        first: index of the first pose, among those of the leg.
-        last: index of the last one.
-        table: how they are joined.
+        first: index of the first pose within the leg.
+        last: index of the last pose within the leg.
+        table: table of the path that joins them.
     """
 
     first: int
@@ -53,12 +53,12 @@ class PathRun(NamedTuple):
 
 
 class Ride(NamedTuple):
-    """Section of a run, and what its motion needs.
+    """Section of a path, with settings of its motion.
 
     Fields:
-        section: in the axes of the kernels.
-        settings: of its motion.
-        segments: (k - 1,) numbers of the segments between its k knots.
+        section: section in the axes of the kernels.
+        settings: settings of the motion along it.
+        segments: (k - 1,) indices of the segments between its k knots.
     """
 
     section: Section
@@ -80,7 +80,7 @@ class Paths(Leg):
 
     @classmethod
     def for_searches(cls, waypoints: Waypoints) -> Leg:
-        """Lines between the poses, whatever the plan says of paths; see `Leg.for_searches`."""
+        """Leg of straight lines between poses, for searches; paths of the plan are ignored; see `Leg.for_searches`."""
         return FastestLines(waypoints)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
@@ -109,11 +109,11 @@ class Paths(Leg):
         return paths, list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Notes of files, ramps that are shorter than asked for; see `Leg.warnings`."""
+        """Notes about files, and warnings of ramps shorter than requested; see `Leg.warnings`."""
         return self._notes
 
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:
-        # Sections of all runs, in the axes of the kernels; notes of their files.
+        # Return sections of all paths, in the axes of the kernels, and notes about their files.
         waypoints, rides = self.waypoints, list[Ride]()
         self._notes, cells = [], 0
         positions = np.array(waypoints.frame.outward(waypoints.points(z0)))
@@ -141,7 +141,7 @@ class Paths(Leg):
 
     @property
     def _runs(self) -> list[PathRun]:
-        # A path ends where a pose has a path of its own, before one, and at rest.
+        # A path ends at rest, and at a pose before one that has a path of its own.
         poses, spec, first, runs = self.waypoints.poses, self.waypoints.plan_file, 0, list[PathRun]()
         usual = PathTable() if spec.path is None or spec.is_one_path else spec.path
         for i, pose in enumerate(poses[1:], start=1):
@@ -150,7 +150,7 @@ class Paths(Leg):
             if pose.path is not None:
                 runs.append(PathRun(i - 1, i, pose.path.beside(spec.path)))
             elif ends:
-                # The speeds are those at the ends of the leg.
+                # Speeds are given only at the ends of the leg.
                 inner = ["start_speed"] * (first > 0) + ["end_speed"] * (i < len(self))
                 runs.append(PathRun(first, i, usual.model_copy(update=dict.fromkeys(inner))))
             if pose.path is not None or ends:
@@ -165,7 +165,7 @@ class Paths(Leg):
         )
 
     def _path_spec(self, run: PathRun, positions: np.ndarray, units: np.ndarray | None) -> PathSpec:
-        # Path of a run, in the axes of the robot file.
+        # Return the path through poses, in the axes of the robot file.
         waypoints, table = self.waypoints, run.table
         if not table.is_whole:
             chosen = slice(run.first, run.last + 1)
@@ -191,7 +191,7 @@ class Paths(Leg):
         return path_of(table, ends, waypoints.path.parent, axes)
 
     def _placed(self, section: Section, spec: PathSpec) -> Section:
-        # The section in the axes of the kernels, on the plane or the guide of the robot.
+        # Convert the section to the axes of the kernels, and to the plane or the guide of the robot.
         curve = kept_to(self.waypoints.robot_file.own_pattern, section.curve, is_planar=spec.is_planar)
         return section._replace(curve=placed_inward(curve, self.waypoints.frame, np.array(IDENTITY)))
 
@@ -207,7 +207,7 @@ class Paths(Leg):
             raise ConfigError(waypoints.path, f"{name}.path.orientations: must be absent: the poses have them")
 
     def _check_going_on(self, rides: list[Ride]) -> None:
-        # A motion that does not stop goes on at its speed and in its direction.
+        # Refuse a motion that passes a pose with a jump of speed or direction.
         for before, after in itertools.pairwise(rides):
             one, other = before.settings.end_speed, after.settings.start_speed
             name = f"{self.waypoints.name(int(after.segments[0]))}"
@@ -228,7 +228,7 @@ def _parts(count: int) -> str:
 
 
 def _cells(spec: PathSpec, grid: int) -> int:
-    # Cells of the grids of a path; what would not be proved is refused before it takes hours.
+    # Refuse too many cells, which could not be proved, before the work takes hours.
     cells = sum(max(grid, len(path.s) - 1) for path in spec.parts)
     if cells > MOST_CELLS:
         error = f"{_parts(len(spec.parts))}: {cells:,} cells"
@@ -238,13 +238,13 @@ def _cells(spec: PathSpec, grid: int) -> int:
 
 
 def _direction(curve: Spline, piece: int) -> np.ndarray:
-    # Unit vector of the direction at the start of the first piece, or at the end of the last one.
+    # Return the unit vector of the direction at the start of the first piece, or at the end of the last one.
     step = np.diff(np.asarray(curve.position)[piece], axis=0)[piece]
     return step / (np.linalg.norm(step) or 1.0)
 
 
 def _settled(run: PathRun, sections: list[Section], segments: np.ndarray) -> list[Ride]:
-    # Sections of a run with their settings; the motion is at rest between them.
+    # Return the sections of a path with their settings; the motion is at rest between them.
     table, rides, first = run.table, list[Ride](), 0
     grid = GRID if table.grid is None else table.grid
     ramp_time = RAMP_TIME if table.ramp_time is None else table.ramp_time
@@ -258,14 +258,14 @@ def _settled(run: PathRun, sections: list[Section], segments: np.ndarray) -> lis
 
 
 def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:
-    """Motion of a ride, with the segments in which its cells lie."""
+    """Motion along a section, with the segments that its cells belong to."""
     middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
     parts = np.clip(np.searchsorted(ride.section.knots, middles) - 1, 0, len(ride.segments) - 1)
     return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
 
 
 def cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
-    """Parts of a motion between poses."""
+    """Parts of a motion along a section, cut at poses, with the indices of their segments."""
     changes = np.flatnonzero(np.diff(ride.segments)) + 1
     knots = [0.0, *ride.section.knots[changes].tolist(), float(ride.section.knots[-1])]
     indices = [int(np.argmin(np.abs(fastest.coordinate - knot))) for knot in knots]

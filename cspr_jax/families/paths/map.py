@@ -20,7 +20,7 @@ class PathsMap(ProvedMap):
     """The least duration of all motions along the path to each target; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
-        """Keep what paths need; see `ProvedMap`."""
+        """Read the keys of paths; see `ProvedMap`."""
         super().__init__(robot_file, spec, file)
         self._path, self._pattern = spec.trajectory.path or TargetPath(), robot_file.own_pattern
 
@@ -54,7 +54,7 @@ class PathsMap(ProvedMap):
         )
 
     def _sections(self, table: PathTable, start: np.ndarray, end: np.ndarray) -> list[Section]:
-        # The path as a plan has it, in the axes of the kernels.
+        # Return the path as a plan would have it, in the axes of the kernels.
         points = np.array([start, *(table.points or ()), end])
         units = None if self._unit is None else np.tile(self._unit, (len(points), 1))
         sections = path_through(table, points, units).sections()
@@ -64,6 +64,6 @@ class PathsMap(ProvedMap):
         return placed_inward(kept_to(self._pattern, curve, is_planar=False), self._frame, np.array(IDENTITY))
 
     def _at_rest(self, position: np.ndarray) -> Spline:
-        # A motion at rest for one second.
+        # Return a motion that stays at rest for one second.
         unit = None if self._unit is None else as_float64(self._unit[None, None])
         return self._placed(Spline(as_float64(np.array([0.0, 1.0])), as_float64(position[None, None]), unit))

@@ -1,9 +1,9 @@
-"""Paths of motions of any kind, as sections from stop to stop, along which they can be run at other speeds.
+"""Paths of motions of any kind, as sections from stop to stop, along which other speeds can be chosen.
 
-With the speed g = sqrt(|v|^2 + (r w)^2) of a motion, where r is the radius of the platform, the path has the coordinate
-ds = g dt, the first derivative p' = v / g and the second one (a - p' dg/dt) / g^2; quaternions likewise. At a stop p'
-is the direction of the acceleration, or, where that vanishes too, the limit of v / g, from samples beside the stop;
-p'' may have no limit there, and is that of the cubic through the end of the first piece.
+With the speed g = sqrt(|v|^2 + (r w)^2) of a motion, where r is the radius of the platform, the path coordinate has
+ds = g dt, the first derivative is p' = v / g and the second (a - p' dg/dt) / g^2; quaternions likewise. At a stop p' is
+the direction of the acceleration or, if that vanishes too, the limit of v / g, from samples beside the stop; p'' may
+have no limit there, and is taken from the cubic through the end of the first piece.
 """
 
 import dataclasses
@@ -24,21 +24,21 @@ from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# A piece is halved while it is farther from the motion's path than this, m, turns by a larger angle, rad, or has a
-# larger ratio of speeds at its ends.
+# A piece is halved while it is farther than this from the path of the motion, m, while it turns by more than this
+# angle, rad, or while the ratio of the speeds at its ends is larger than this.
 CLOSE, TURN, RATIO = 1e-8, 0.1, 1.3
-HALVINGS = 32  # at most
-BRIEF = 4e-6  # s; pieces of a shorter time are not halved, since second derivatives in time are rounded too much
-PIECES, FEWEST = 48, 4  # of a section at first, and of each smooth part at least
-# Fractions of a smooth part at which samples beside a stop lie that give the direction there, and their weights.
+HALVINGS = 32  # largest number of halvings
+BRIEF = 4e-6  # s; shorter pieces are not halved, since rounding affects their second derivatives too much
+PIECES, FEWEST = 48, 4  # number of pieces of a section at first, and smallest number in each smooth part
+# The direction at a stop is extrapolated from samples at these fractions of a smooth part, with these weights.
 BESIDE, WEIGHTS = 1e-3 * np.arange(1.0, 5.0), np.array([4.0, -6.0, 4.0, -1.0])
-# Relative difference of the speed there from acceleration times time up to which the acceleration counts as constant.
+# Near a stop the acceleration counts as constant if speed and acceleration times time differ by less than this.
 UNEVEN = 0.1
-# Each piece is divided here, as fractions of its time: for quadrature, and to compare the curve with the motion.
+# Fractions of the time of each piece that divide it, for quadrature, and for comparing the curve with the motion.
 QUARTERS = np.linspace(0.0, 1.0, 5)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 AXES = 3
-# Except at stops, the mass centre moves at more than this fraction of the platform's speed, or the platform only turns.
+# Except at stops, the mass centre is faster than this fraction of the platform's speed, or the platform only turns.
 TURNS = 1e-6
 
 
@@ -46,12 +46,12 @@ class Retraced(NamedTuple):
     """Path of motions from one stop to the next.
 
     Fields:
-        section: in the axes of the motions; its knots are ends of motions, and points where
+        section: section in the axes of the motions; its knots are at ends of motions, and where
             the motion almost stops.
         segments: (k - 1,) indices of the motions between its k knots.
-        speeds: of the mass centre at its start and at its end, m/s.
-        accelerations: of the motions.
-        deviation: largest distance of the section from the path, at samples, m.
+        speeds: speeds of the mass centre at the start and at the end, m/s.
+        accelerations: path accelerations of the motions.
+        deviation: largest distance of the section from the path of the motions, at samples, m.
     """
 
     section: Section
@@ -63,7 +63,7 @@ class Retraced(NamedTuple):
 
 @dataclasses.dataclass
 class _Pieces:
-    # Pieces of a section, n: the smooth part that each belongs to, and its fractions of the part.
+    # The n pieces of a section: the smooth part that each belongs to, and its start and end as fractions of the part.
     number: np.ndarray
     start: np.ndarray
     end: np.ndarray
@@ -77,11 +77,11 @@ class _Pieces:
         return _Pieces(number, start, end)
 
     def times(self, times: np.ndarray) -> np.ndarray:
-        # Times of the pieces, from those of the parts.
+        # Return the times of the pieces from those of the parts.
         return times[self.number] * (self.end - self.start)
 
     def within(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # Parts and fractions of them at fractions of all pieces, (n * k,) each.
+        # Return parts, and fractions of parts, at given fractions of all pieces, (n * k,) each.
         inner = self.start[:, None] + (self.end - self.start)[:, None] * fractions
         return np.repeat(self.number, len(fractions)), inner.ravel()
 
@@ -109,7 +109,7 @@ def retraced(
 
 
 def _feed(motions: MotionSequence, part: SmoothPart, feeds: Sequence[np.ndarray | None]) -> float:
-    # Feed in a smooth part, which lies in one piece of its motion.
+    # Return the feed in a smooth part, which lies in one piece of its motion.
     pieces = feeds[part.motion] if feeds else None
     if pieces is None:
         return np.inf
@@ -132,7 +132,7 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
             break
         pieces = pieces.halved(chosen)
     numbers = np.array([part.motion for part in parts])[pieces.number]
-    # Nodes are close together where the motion almost stops, too.
+    # Nodes are close together where the motion almost stops as well.
     is_knot = np.diff(numbers, prepend=-1) != 0
     narrow = np.diff(curve.knots) < curve.knots[-1] / cells
     is_knot[1:] |= narrow[1:] & narrow[:-1]
@@ -153,8 +153,8 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
 
 
 def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) -> np.ndarray:
-    # Tell for each piece whether direction or speed change much along it. Pieces at a stop, where speed always does,
-    # are left out.
+    # Tell for each piece whether direction or speed change much along it. Pieces at a stop do not count: there the
+    # ratio of speeds is always large.
     start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     speeds = np.stack([start.speed, end.speed])
     ratio = speeds.max(0) > RATIO * speeds.min(0)
@@ -168,7 +168,7 @@ def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) 
 def _path_accelerations(
     motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, curve: Spline
 ) -> PathAccelerations:
-    # At an end of a piece where the acceleration jumps, that on the side of the piece counts.
+    # If the acceleration jumps at the end of a piece, take its value inside the piece.
     start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     speed_rates = []
     for rates in (start, end):
@@ -181,7 +181,7 @@ def _path_accelerations(
 
 
 def _signs(motions: MotionSequence, parts: list[SmoothPart]) -> np.ndarray:
-    # Signs (m,) with which quaternions are continuous from part to part.
+    # Return signs (m,) that make quaternions continuous from part to part.
     count = np.arange(len(parts))
     first, last = (motions.inside(parts, count, np.full(len(parts), fraction)).position for fraction in (0.0, 1.0))
     products = np.sum(first[1:, AXES:] * last[:-1, AXES:], axis=1)
@@ -191,7 +191,7 @@ def _signs(motions: MotionSequence, parts: list[SmoothPart]) -> np.ndarray:
 def _curve(
     motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, signs: np.ndarray
 ) -> tuple[Spline, np.ndarray]:
-    # Hermite pieces, and the largest distance of each from the path of the motions.
+    # Return Hermite pieces, and the largest distance of each from the path of the motions.
     times = pieces.times(motions.times(parts))
     fractions = (QUARTERS[:-1, None] + 0.125 * (_POINTS + 1.0)).ravel()
     speeds = motions.inside(parts, *pieces.within(fractions)).speed.reshape(len(times), len(QUARTERS) - 1, -1)
@@ -227,10 +227,10 @@ def _curve(
 
 
 def _direction(beside: MovingPoints, times: np.ndarray) -> np.ndarray:
-    # Derivative along the path at a stop, from samples beside it, at times (2,) after the stop, s; before it if < 0.
+    # Return the derivative along the path at a stop, from samples at times (2,) after the stop, s; negative: before it.
     norm = np.linalg.norm(beside.acceleration[0])
     if abs(beside.speed[0] / abs(times[0]) - norm) < UNEVEN * norm:
-        # Beside the stop the acceleration hardly changes, and gives the direction.
+        # Near the stop the acceleration is almost constant, and gives the direction.
         direction, acceleration = (2.0 * pair[0] - pair[1] for pair in (beside.second, beside.acceleration))
         return np.sign(times[0]) * direction / np.linalg.norm(acceleration)
     mean = WEIGHTS @ _derivatives(beside)[1]
@@ -238,7 +238,7 @@ def _direction(beside: MovingPoints, times: np.ndarray) -> np.ndarray:
 
 
 def _derivatives(rates: MovingPoints) -> list[np.ndarray]:
-    # Position and its first two derivatives along the path.
+    # Return the position and its first two derivatives along the path.
     speed = rates.speed[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):  # at stops
         first = rates.first / speed
@@ -247,7 +247,7 @@ def _derivatives(rates: MovingPoints) -> list[np.ndarray]:
 
 
 def _distances(off: np.ndarray, rates: MovingPoints, radius: float) -> np.ndarray:
-    # Lengths of the components across the path; quaternions differ by half of the angle between the orientations.
+    # Return lengths of the components across the path; a quaternion changes by half the angle of its orientation.
     off = np.concatenate([off[:, :AXES], 2.0 * radius * off[:, AXES:]], axis=1)
     along = np.concatenate([rates.first[:, :AXES], 2.0 * radius * rates.first[:, AXES:]], axis=1)
     along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Answers about motions between poses, once their numbers of arcs are known."""
+"""Answers for motions between poses, once numbers of arcs are chosen."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ NEVER = np.iinfo(int).max
 
 @dataclasses.dataclass(frozen=True)
 class PlatformMotionAnswers(Answers):
-    """Answers about segments between poses, one a segment.
+    """Answers for segments between poses.
 
     Fields:
-        beta_hat: (n, 2) at both ends.
-        det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, where there is
-            no determinant, and contacts with the platform are not looked for.
-        cable_distance: (n,) smallest distance between cables that can meet, m.
+        beta_hat: (n, 2) beta-hat at both ends.
+        det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, which have no
+            determinant, and whose contacts with the platform are not checked.
+        cable_distance: (n,) smallest distance between cables that can touch, m.
         refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
-            contacts; NaN where it is not, and of contacts where they were only sampled.
+            contacts; NaN if it is not refuted, or by contacts that were only sampled.
     """
 
     beta_hat: np.ndarray
@@ -72,7 +72,7 @@ def settled(
     margins: bool = True,
     is_final: bool = True,
 ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
-    """Answers about motions, with and without a feasible number of arcs."""
+    """Answers for motions, with and without a feasible number of arcs."""
     tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
     if fixed is not None:
         tried = np.where(tried > 0, tried, np.maximum(fixed, 0))
@@ -120,7 +120,7 @@ def settled(
 def _confirmed(
     checker: MotionChecker, segments: PlatformSegment, smallest: FewestArcs
 ) -> tuple[FewestArcs, np.ndarray]:
-    # Numbers of arcs whose motions a proof leaves open, or refutes between samples, are undecided; say which these are.
+    # A number of arcs is undecided if a proof leaves its motion open, or refutes it only between samples; name it.
     passed = np.flatnonzero(smallest.arcs > 0)
     if len(passed):
         part = checker.confirmed(take_segments(segments, passed), smallest.arcs[passed], smallest.checks.take(passed))
@@ -141,7 +141,7 @@ def _reasons(
     max_arcs: int,
     fixed: np.ndarray | None,
 ) -> np.ndarray:
-    # Return the flags of the criteria that keep motions from having a number of arcs.
+    # Return the flags of the criteria that refuse a number of arcs.
     limits = sum({flag.value for flag in itertools.compress(checker.flags, checker.is_limit)})
     basic = checks.verdict & ~(limits & ~Verdict.SLACK_CABLE.value)
     by_limits = refused.arcs > 0
@@ -155,7 +155,7 @@ def _reasons(
     named = np.zeros(len(basic), int)
     for flag, column in zip(checker.flags, broken.T, strict=True):
         named |= np.where(column, flag.value, 0)
-    # Some of these motions are proved except for limits, or for the planned robot alone.
+    # Some of these motions are proved but for limits, or for the planned robot alone.
     alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
     return np.where(by_limits, alone, basic | named)
 
@@ -163,7 +163,7 @@ def _reasons(
 def trials(
     motions: Candidates, values: Float[np.ndarray, "n n_values"], *, same: bool = False
 ) -> tuple[Float[np.ndarray, "k"], Candidates]:
-    """Motions with each of several values of beta-hat at their ends."""
+    """Motions with several values of beta-hat at their ends."""
     cell, option = np.nonzero(~np.isnan(values))
     return cell, _with_ends(motions.take(cell), values[cell, option], same=same)
 
@@ -178,23 +178,23 @@ def reached(
     margins: bool = True,
     fixed: np.ndarray | None = None,
 ) -> PlatformMotionAnswers:
-    """Smallest numbers of arcs of motions, each with several values of beta-hat at its end."""
+    """Smallest numbers of arcs of motions, each tried with several values of beta-hat at its end."""
     cell, trial = trials(motions, values, same=same)
     of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, fixed=fixed, margins=margins)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
-    # Several values of one motion may have passed: in reverse order, the one tried first is written last.
+    # Several values may pass for one motion: write in reverse order, so that the value tried first remains.
     best = np.flatnonzero(of_trials.arcs > 0)[::-1]
     arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
     checks.put(cell[best], of_trials.checks.take(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
     smallest = FewestArcs(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    # A motion without an answer takes the value at which the fewest limits refuse it, if there is such a value.
+    # A motion without an answer takes the value that the fewest limits refuse, if any.
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
     of_limits = refused_by_limits(checker, trial.take(open_ones), max_arcs=max_arcs, fixed=fixed)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
     ranks = rank(checker.flags, of_limits.broken)
-    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # the fewest limits, then the fewest arcs, are written last
+    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # written last: the fewest limits, then the fewest arcs
     best = best[of_limits.arcs[best] > 0]
     cells = cell[open_ones[best]]
     refused.arcs[cells], refused.broken[cells] = of_limits.arcs[best], of_limits.broken[best]

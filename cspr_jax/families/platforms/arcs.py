@@ -21,28 +21,28 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.fewest_limits import FewestLimits, Refused
 
 BATCH = 2048
-# Number of candidates that are held at a time.
+# Number of candidates in memory at a time.
 CANDIDATES = 262_144
-# Times of the screen, in arcs before the end: first those at which most motions fail, in the order of how many they
-# refute; then those at which most of the others fail, with one beside the start, where the second derivative of the
-# amplitude function may be largest. They were chosen one by one among motions of the MSSM with three amplitude
-# functions; other times would be correct too, but slower.
+# Times of the screen, in arcs before the end. The first ones are those at which most motions fail, in descending order
+# of how many they refute; the others are those at which most remaining motions fail, and one beside the start, where
+# the second derivative of the amplitude function may be largest. They were chosen one by one on motions of the MSSM
+# with three amplitude functions; other times would also be correct, but slower.
 FIRST_TIMES = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 OTHER_TIMES = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
-# Samples per arc in the search for the best of infeasible candidates.
+# Number of samples per arc in the search for the best of infeasible candidates.
 COARSEST = 4
 
 
 class Candidates(NamedTuple):
-    """Motions whose smallest number of arcs is sought, with values of beta-hat to be tried.
+    """Motions whose smallest numbers of arcs are searched for, with values of beta-hat to try.
 
     Fields:
-        start: position (m, 3) m and quaternion (m, 4) of each motion.
-        end: likewise.
+        start: positions (m, 3), m, and quaternions (m, 4) of the motions.
+        end: positions and quaternions likewise.
         z0: (m,) depth of P0, m.
-        motion: (n,) motion of each candidate, in any order; among candidates of one motion, those that are tried first
-            come first.
+        motion: (n,) index of the motion of each candidate, in any order; candidates of one motion are in the order in
+            which they are tried.
         beta_hats: beta-hat at the start (n,) and at the end (n,).
     """
 
@@ -53,11 +53,11 @@ class Candidates(NamedTuple):
     beta_hats: tuple[np.ndarray, np.ndarray]
 
     def take(self, index: np.ndarray) -> "Candidates":
-        """Candidates chosen by indices, or by a mask (n,)."""
+        """Candidates selected by indices, or by a mask (n,)."""
         return self._replace(motion=self.motion[index], beta_hats=(self.beta_hats[0][index], self.beta_hats[1][index]))
 
     def motions(self, index: np.ndarray) -> "Candidates":
-        """Motions of one candidate each, chosen by indices."""
+        """Motions of one candidate each, selected by indices."""
         start, end, beta_hats = ((a[index], b[index]) for a, b in (self.start, self.end, self.beta_hats))
         return Candidates(start, end, self.z0[index], np.arange(len(index)), beta_hats)
 
@@ -66,10 +66,10 @@ class FewestArcs(NamedTuple):
     """Smallest numbers of arcs.
 
     Fields:
-        arcs: (n,) 0 where no number passes all tests, or where another candidate had one already; several candidates of
-            a motion may have a number.
-        undecided: (n,) the smallest number that stayed undecided; 0: none did.
-        checks: valid of candidates with a number of arcs only.
+        arcs: (n,) smallest number; 0 where none passes all tests, or another candidate of the motion has one already;
+            several candidates of a motion may have a number.
+        undecided: (n,) smallest number that stayed undecided; 0 for none.
+        checks: checks of the motions; valid only for candidates with a number of arcs.
     """
 
     arcs: np.ndarray
@@ -86,8 +86,8 @@ def _motions(robot: PlatformRobot, odd, motions) -> PlatformSegment:
 
 
 class _Segments:
-    # Segments of candidates. All but beta-hat belongs to the motion, and is computed once for each parity of the number
-    # of arcs.
+    # Segments of candidates. All but beta-hat is a property of the motion, and is computed once for each parity of the
+    # number of arcs.
 
     def __init__(self, robot: PlatformRobot, candidates: Candidates) -> None:
         self._candidates = candidates
@@ -133,7 +133,7 @@ def smallest_arcs(
         alive = np.flatnonzero((smallest == 0) & is_open[motion])
         alive = _screened(checker, segments, arcs, alive, _times_before_end(arcs, FIRST_TIMES))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
-        # The first candidate of each motion, then all others of motions where it fails: few and large batches.
+        # Try first one candidate of each motion, then all others of motions where it fails: few and large batches.
         for group in (alive[first], np.delete(alive, first)):
             group = group[last[motion[group]] >= arcs]
             group = _screened(
@@ -155,7 +155,7 @@ def _is_tried(arcs: int, only: np.ndarray) -> np.ndarray:
 
 
 def _times_before_end(arcs: int, before: np.ndarray) -> np.ndarray:
-    # Return times so many arcs before the end; the start, where nothing fails, if the motion is shorter.
+    # Return times this many arcs before the end; if the motion is shorter, the start, where nothing fails.
     return np.maximum(1.0 - before / arcs, 0.0)
 
 
@@ -168,7 +168,7 @@ def _screened(
     *,
     limits: bool = True,
 ) -> np.ndarray:
-    # Keep the candidates that none of the samples refutes.
+    # Keep the candidates that no sample refutes.
     if not len(alive):
         return alive
     return alive[~checker.screen.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
@@ -177,7 +177,7 @@ def _screened(
 def refused_by_limits(
     checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> Refused:
-    """Smallest numbers of arcs at which only limits refuse candidates, of motions without a feasible candidate."""
+    """Smallest numbers of arcs at which only limits refuse candidates, for motions without a feasible candidate."""
     motion, count = candidates.motion, len(candidates.motion)
     fewest, is_limit = FewestLimits(count, checker.flags), checker.is_limit
     if not count or not is_limit.any():
@@ -196,7 +196,7 @@ def refused_by_limits(
 
 
 def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
-    # Tell which motions are proved except for limits that they break, (n,), and return these limits, (n, n_criteria).
+    # Tell which motions are proved but for limits that they break, (n,), and return these limits, (n, n_criteria).
     each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
     first = checker.check(segments, each, full=False, margins=False, ignored=is_limit)
     is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
@@ -213,7 +213,7 @@ def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int
             broken[alike] |= more
             left.append(alike[more.any(1)])
         unclear = np.concatenate(left)
-        is_proved[unclear] = True  # except for more limits
+        is_proved[unclear] = True  # but for more limits
     is_proved[unclear] &= (broken[unclear] == is_limit).all(1)
     return is_proved, broken
 
@@ -231,7 +231,7 @@ def unavoidable(
         return suspects
     only = np.zeros(len(suspects), int) if fixed is None else fixed
     segments, ends = _Segments(checker.problem.robot, candidates), np.array([0.0, 1.0])
-    # A criterion that is broken at an end of a motion is broken with every number of arcs.
+    # A criterion that is broken at an end of a motion is broken for every number of arcs.
     certain = suspects & checker.breaks(checker.sampled(segments(2, np.arange(len(only))), 2, ends))
     suspects = suspects & ~certain
     for arcs in range(1, max_arcs + 1):
@@ -258,7 +258,7 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
 
 
 def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: Float[np.ndarray, "n"]) -> PlatformSegment:
-    """The segments for given numbers of arcs."""
+    """The segments of candidates with given numbers of arcs."""
     segments, indices = _Segments(robot, candidates), np.arange(len(arcs))
     even, odd = (segments(k, indices) for k in (0, 1))
     return jax.tree.map(lambda a, b: np.where((arcs % 2 == 1).reshape(-1, *[1] * (a.ndim - 1)), b, a), even, odd)

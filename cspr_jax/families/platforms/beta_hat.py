@@ -1,4 +1,4 @@
-"""Values of beta-hat to try at the ends of segments, poses where none can end, and the choice along a sequence."""
+"""Values of beta-hat to try at the ends of segments, poses at which none can end, and choices for a sequence."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_balance import determinant_ratio, is_regular
 
-# Larger values of beta-hat have never helped, docs/theory.md.
+# Larger values of beta-hat never helped, see docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
-# Poses that are computed in one call.
+# Number of poses computed in one call.
 BATCH = 1024
-# Arcs tried beyond the first number that some values allow: more are rarely better.
+# Number of arcs tried beyond the first number that some values allow; more are rarely better.
 BEYOND = 4
 
 
@@ -30,10 +30,10 @@ def options(
     highest: Float[np.ndarray, "n"],
     count: int = OPTIONS,
 ) -> Float[np.ndarray, "n count"]:
-    """Values of beta-hat in the order in which they are tried.
+    """Values of beta-hat to try, in order.
 
-    First the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92); then
-    values that divide the interval evenly, the nearest to the first one first. The interval is cut at +-12.
+    The first is the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92). The
+    others divide the interval, cut at +-12, evenly; those nearest to the first one come first.
     """
     preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
     low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
@@ -47,7 +47,7 @@ def options(
 
 @jax.jit
 def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
-    # Return for each pose (3.91), the interval (3.92), the determinant over its value at the same depth in the middle,
+    # Return for each pose (3.91), the interval (3.92), the determinant over its value in the middle at the same depth,
     # and the depth.
     def one(position, quaternion, z0):
         end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
@@ -74,10 +74,10 @@ def end_options(
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:
     """Choose an option for each pose of a sequence, so that the total cost of the segments is smallest.
 
-    Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
-    infeasible segments.
+    Among equal sums, options that are tried first win; if no path is feasible, the path with the fewest infeasible
+    segments.
     """
-    # An infeasible segment costs more than everything else together.
+    # Let an infeasible segment cost more than all feasible ones together.
     finite = [c[np.isfinite(c)] for c in costs]
     wall = 1.0 + 10.0 * sum(float(c.max()) if c.size else 0.0 for c in finite)
     total, back = np.arange(costs[0].shape[0]) * 1e-9, []

@@ -1,4 +1,4 @@
-"""The checker of a platform's motions: by its number of cables."""
+"""The checker of motions of a platform, chosen by its number of cables."""
 
 from cspr_jax.families.platforms.motion_checker import FEW, MotionChecker
 from cspr_jax.families.platforms.redundant.redundant_checker import RedundantChecker

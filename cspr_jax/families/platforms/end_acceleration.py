@@ -19,18 +19,18 @@ from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_balance import jacobian
 
-# At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
+# At rest in the reference orientation beta-hat is arbitrary; this value is that of a pendulum.
 AT_REST = -1.0
-# Tensions that change less than this, relative to the mean one, do not depend on beta-hat.
+# Tensions with a relative change below this count as independent of beta-hat.
 FLAT = 1e-12
 
 
 class Endpoint(NamedTuple):
-    """Tensions per mass and length at an end, offset + derivative * beta-hat, and the beta-hat that they allow.
+    """Tensions per mass and length at an end, offset + derivative * beta-hat, and the beta-hat that keep cables taut.
 
     Fields:
-        offset: (n_cables,) 1/s^2.
-        derivative: (n_cables,) 1/s^2.
+        offset: (n_cables,) tensions at beta-hat = 0, 1/s^2.
+        derivative: (n_cables,) derivative with respect to beta-hat, 1/s^2.
         preferred: () beta-hat of (3.91), which makes the tensions as equal as possible.
         lowest: () start of the interval (3.92) in which every cable is taut; above `highest` if the interval is empty.
         highest: () end of the interval.
@@ -54,7 +54,7 @@ def endpoint(
     zero = jnp.zeros(3)
     right = jnp.stack([jnp.concatenate([-eta * position, zero]), jnp.concatenate([zero, moment])], axis=1)
     offset, derivative = solved(matrix, right)[0].T  # (3.79)
-    # The translation fixes the mean tension by (3.13); it is eta / n_cables if both centroids are at the origin.
+    # The translation determines the mean tension by (3.13): eta / n_cables if both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     mean_ray = jnp.mean(cables, axis=0)
     mean_tension = eta * jnp.dot(position, mean_ray) / jnp.dot(mean_ray, mean_ray) / robot.n_cables
@@ -81,7 +81,7 @@ def end_state(
     z0: Float[Array, ""],
     beta_hat: Float[Array, ""],
 ) -> State:
-    """State at one end of a segment, of a robot on any number of cables."""
+    """State at one end of a segment, for any number of cables."""
     eta, zero = robot.gravity / z0, jnp.zeros(3)
     away = position - rest_point(z0)
     rotation = rotations.matrix(quaternion)

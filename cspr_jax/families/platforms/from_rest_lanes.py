@@ -1,9 +1,9 @@
-"""Transitions of a platform from rest, one lane a segment: the fewest operations that give a state.
+"""Transitions of a platform from rest, one lane a segment, with the fewest operations for a state.
 
-Such a motion is a straight swing and a rotation about one axis. All that depends on the number of arcs and on time
-is in a table: position and acceleration are one number each times a vector of the segment, and angle, angular
-speed and angular acceleration are linear in the two values of beta-hat. The mechanics are the same as in
-`platform_segment_lanes` (tests compare them).
+Such a motion is a straight swing and a rotation about one axis. A table holds all that depends on the number of arcs
+and on time: position and acceleration are numbers times a vector of the segment; angle, angular speed and angular
+acceleration are linear in the two values of beta-hat. The mechanics are those of `platform_segment_lanes` (tests
+compare both).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Swings(NamedTuple):
 
     Fields:
         center: the point p0, m.
-        end_offset: vector from p0 to the end, along the first arc; m.
+        end_offset: vector from p0 to the end in the direction of the first arc, m.
         axis: unit vector of the rotation.
-        angle: full angle of the envelope, in half turns; (n,).
-        start_beta_hat: beta-hat in p0, (n,).
-        end_beta_hat: beta-hat at the end, (n,).
-        rate: lambda of (3.50), 1/s^2; (n,).
+        angle: (n,) full angle of the envelope, in half turns.
+        start_beta_hat: (n,) beta-hat in p0.
+        end_beta_hat: (n,) beta-hat at the end.
+        rate: (n,) lambda of (3.50), 1/s^2.
     """
 
     center: Vector
@@ -51,8 +51,8 @@ class Swing(NamedTuple):
         position: m.
         acceleration: m/s^2.
         rotation: rows of the rotation matrix.
-        squared_speed: of the rotation, (n,) rad^2/s^2.
-        angular_acceleration: about the axis, (n,) rad/s^2.
+        squared_speed: (n,) square of the angular speed, rad^2/s^2.
+        angular_acceleration: (n,) angular acceleration about the axis, rad/s^2.
     """
 
     position: Vector
@@ -79,7 +79,7 @@ def swings(segments: PlatformSegment) -> Swings:
 def rest_table(
     amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, "m"], kind: PlatformMotionKind
 ) -> Float[Array, "m 11"]:
-    """Table common to all segments from rest of one number of arcs."""
+    """Table that all segments from rest with the same number of arcs have in common."""
     theta = math.pi * arcs
     a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
     sine, cosine = sincospi(arcs * tau)
@@ -97,7 +97,7 @@ def rest_table(
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
-    # Return beta_1 of (3.66) and its derivatives, and zeros for the factors of beta-hat.
+    # Return beta_1 of (3.66) and its derivatives, and zeros as factors of beta-hat.
     nothing = jnp.zeros_like(sine)
     return [(cosine, -sine, -cosine), (nothing,) * 3, (nothing,) * 3]
 
@@ -115,7 +115,7 @@ def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> lis
 
 
 def swing(motions: Swings, row: Float[Array, "11"]) -> Swing:
-    """The state at one time."""
+    """The state of swings at one time, given by a row of the table."""
 
     def blended(k):
         return row[k] + motions.start_beta_hat * row[k + 1] + motions.end_beta_hat * row[k + 2]

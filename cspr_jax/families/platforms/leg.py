@@ -1,4 +1,4 @@
-"""Leg of poses of a platform, chapter 3: orientations, values of beta-hat, and the search along the leg."""
+"""Leg of poses of a platform, chapter 3: orientations, values of beta-hat, and the choice of motions."""
 
 import itertools
 from pathlib import Path
@@ -37,13 +37,13 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.verification.fewest_limits import Refused
 
-# The third derivative of the amplitude function jumps at a knot if it changes by this fraction of its largest value.
+# The third derivative of the amplitude function counts as jumping at a knot if it changes by this relative amount.
 JUMP = 1e-6
-NEAR_KNOT = 1e-12  # distance from a knot at which it is compared
+NEAR_KNOT = 1e-12  # it is compared at this distance from a knot
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# Cost, in arcs, of a motion that only limits refuse: more than the arcs of any sequence of feasible motions.
+# Cost, in arcs, of a motion that only limits refuse: more than any sequence of feasible motions costs.
 REFUSED = 100_000
-# Up to so many segments, compiling for large batches takes longer than it saves.
+# For up to this many segments, compiling for large batches takes longer than it saves.
 FEW_SEGMENTS = 1000
 
 
@@ -67,20 +67,20 @@ class _Poses(Leg):
         self._given = np.array([_orientation(waypoints.name(i), pose, path) for i, pose in enumerate(waypoints.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:
-        # Return orientations (n_poses, 4) in the kernels' axes; azimuths of tilts are relative to the vertical plane
-        # through the centroid and the point.
+        # Return orientations (n_poses, 4) in the kernels' axes; azimuths of tilts count from the vertical plane through
+        # the centroid and the point.
         poses, frame = self.waypoints.poses, self.waypoints.frame
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
         return np.where(is_given[:, None], frame.rotated_quaternions(self._given), orientations(frame, points, angles))
 
     def check(self, problem: Problem) -> None:
-        """Refuse poses at which no motion can begin or end; see `Leg.check`."""
+        """Refuse poses at which no motion can start or end; see `Leg.check`."""
         waypoints = self.waypoints
         points = waypoints.points(1.0)
         hint = "".join(f" ({line})" for line in plan_hints(waypoints.plan_file, waypoints.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
-            # On more than six cables the margin of their tensions alone decides about poses.
+            # On more than six cables only the margin of tensions decides about poses.
             if not waypoints.poses[i].rest and _is_determined(problem):
                 _check_pose(problem.robot, waypoints.name(i), position, quaternion, waypoints.path, hint)
 
@@ -102,13 +102,13 @@ class _Poses(Leg):
         return self._search(problem, depths, is_final=False)[0]
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Tensions that jump; see `Leg.warnings`."""
+        """Warn of tensions that jump; see `Leg.warnings`."""
         return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
 
     def _search(
         self, problem: Problem, depths: np.ndarray, *, is_final: bool
     ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
-        # Choose the values of beta-hat that give the fewest arcs in sum.
+        # Choose the values of beta-hat with the smallest total number of arcs.
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.waypoints.points(depths)
         quaternions = self._quaternions(points[0])
@@ -134,7 +134,7 @@ class _Poses(Leg):
         return settled(checker, chosen, best, refused=why, max_arcs=largest, fixed=fixed, is_final=is_final)
 
     def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
-        # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.
+        # Find candidates that only limits refuse, in segments where no candidate is feasible or nearly feasible.
         is_open = np.ones(len(trial.z0), bool)
         is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
         open_candidates, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
@@ -153,7 +153,7 @@ class _Poses(Leg):
     def _candidates(
         self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, beta_hats: tuple
     ) -> Candidates:
-        # The motions are the segments, counted over all depths.
+        # Segments of all depths are numbered consecutively.
         depth, i = np.divmod(np.arange(len(z0)), len(self))
         start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
         return Candidates(start, end, z0, motion, beta_hats)
@@ -175,13 +175,13 @@ class _Poses(Leg):
             preferred, lowest, highest = (np.atleast_1d(x) for x in end)
             values = options(preferred, lowest, highest)[0]
             if np.isnan(values[0]) and not _is_determined(checker.problem):
-                values[0] = end[0]  # the verdict says what is wrong
+                values[0] = end[0]  # the verdict says why
             is_one = np.isnan(values[0]) or i in changes
             tries.append(values[:1] if is_one else values[~np.isnan(values)])
         return tries
 
     def _changes(self) -> set[int]:
-        # Return the poses where the family changes: both families take the value that is tried first there, so that
+        # Return the poses where the family changes: there both families take the value tried first, so that
         # accelerations are continuous.
         ends = {0: self.waypoints.first > 0, len(self): self.waypoints.last < len(self.waypoints.plan_file.pose) - 1}
         return {i for i, changes in ends.items() if changes}
@@ -209,8 +209,8 @@ class VariablePoses(_Poses):
 
 
 def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
-    # Choose a candidate of each segment of each depth, (n_depths * n_segments,). Among candidates that fail, those that
-    # only limits refuse come first.
+    # Choose a candidate for each segment at each depth, (n_depths * n_segments,). Among failing candidates, prefer
+    # those that only limits refuse.
     arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
     chosen, last = [], 0
     for of_depth in pairs:
@@ -240,7 +240,7 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
 
 
 def _is_determined(problem: Problem) -> bool:
-    # Tell whether the motion determines the tensions, so that the determinant of a reference pose is a scale.
+    # Tell whether the motion determines the tensions: then the determinant of a reference pose is a scale.
     return problem.robot.n_cables == problem.robot.dof
 
 
@@ -269,7 +269,7 @@ def _check_pose(
 
 
 def _jumps(amplitude: Amplitude) -> bool:
-    # Tell whether A''' jumps between pieces, by NumPy: sums of a few numbers by jax would be programs of their own.
+    # Tell whether A''' jumps between pieces; use NumPy, since small jax operations would each be compiled.
     knots = np.asarray(amplitude.knots)
     before, after = (np.asarray(derivatives(amplitude, knots + s, order=3)[3]) for s in (-NEAR_KNOT, NEAR_KNOT))
     return bool((np.abs(after - before) > JUMP * float(amplitude.largest[3])).any())

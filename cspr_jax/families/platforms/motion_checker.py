@@ -1,4 +1,4 @@
-"""Checkers of a platform's motions: what searches and plans ask of them, whatever the number of cables."""
+"""Protocol of checkers of a platform's motions for searches and plans, for any number of cables."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
-# Sizes of a batch, for few and for many motions: batches are filled up, so that only two sizes are compiled.
+# Numbers of motions in a batch, for few and for many motions; batches are padded, so that only two are compiled.
 FEW, MANY = 256, 2048
-TOUCH = 1e-6  # part of the platform's radius: poses of a plan must not be nearer to a contact
+TOUCH = 1e-6  # fraction of the platform's radius: smallest distance from a contact at poses of a plan
 BESIDE_KNOT = 1e-12
-BASIC = 3  # criteria that are no limits
+BASIC = 3  # number of criteria that are no limits
 
 
 @dataclasses.dataclass(frozen=True)
 class PlatformChecks:
-    """Verdicts, slacks and gaps of n motions.
+    """Verdicts, slacks and distances of cables of n motions.
 
     Fields:
-        verdict: (n,) `Verdict` flags; 0 is feasible.
-        slack: (n, n_criteria) smallest of each criterion of `MotionChecker.flags`; NaN where unknown.
-        gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
-        bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
-            is proved, as on more than six cables before `MotionChecker.confirmed`.
-        refuted_tau: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a
-            small step of it); NaN where it is not refuted, or by contacts that were only sampled.
-        tolerated: (n,) multiple of the uncertainty that the motion is proved to tolerate; for verdicts alone, just 1 or
-            less; NaN where no uncertainty is given, or the motion is not feasible as planned.
-        not_tolerated: (n,) multiple that the motion does not tolerate, likewise; infinite where none was found.
+        verdict: (n,) `Verdict` flags; 0 if feasible.
+        slack: (n, n_criteria) smallest slack of each criterion in `MotionChecker.flags`; NaN where it is not computed.
+        gap: (n,) smallest distance between cables that can touch, m; infinite if none can.
+        bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN without a
+            proof, as on more than six cables before `MotionChecker.confirmed`.
+        refuted_tau: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (to within a
+            small step); NaN if it is not refuted, or by contacts that were only sampled.
+        tolerated: (n,) multiple of the uncertainty that the motion is proved to tolerate; for verdicts alone, at most
+            1; NaN without an uncertainty, or if the motion is not feasible as planned.
+        not_tolerated: (n,) multiple that the motion does not tolerate; infinite if none was found.
     """
 
     verdict: np.ndarray
@@ -51,7 +51,7 @@ class PlatformChecks:
     not_tolerated: np.ndarray
 
     def put(self, index: Float[np.ndarray, "m"], others: "PlatformChecks") -> None:
-        """Write other checks into these."""
+        """Write checks of some motions into these."""
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
             column[index] = new_column
 
@@ -67,12 +67,12 @@ class Screen(Protocol):
         """Smallest slack of the tensions over some samples.
 
         Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) times.
+            segments: leaves (n, ...), all with this number of arcs.
+            arcs: number of arcs.
+            tau: (m,) times of the samples.
 
         Returns:
-            (n,); -inf where not finite.
+            (n,) slacks; -inf where not finite.
         """
         ...
 
@@ -80,13 +80,13 @@ class Screen(Protocol):
         """Mask of the motions that some samples refute.
 
         Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
+            segments: leaves (n, ...), all with this number of arcs.
+            arcs: number of arcs.
             tau: (m,) times, those that refute most motions first.
-            limits: whether limits may refute motions, too.
+            limits: whether limits may refute motions as well.
 
         Returns:
-            (n,).
+            (n,) mask.
         """
         ...
 
@@ -100,12 +100,12 @@ class MotionChecker(abc.ABC):
     """Checker of motions of one robot.
 
     Args:
-        problem: robot, limits, amplitude.
-        batch: how many motions are computed at a time.
+        problem: robot, limits and amplitude function.
+        batch: number of motions computed at a time.
 
     Fields:
-        flags: verdict of each criterion where it is broken: slack cables, singular poses, poses above the spools, then
-            limits. Where a criterion does not apply, its slack is NaN or infinite.
+        flags: flag of each criterion: slack cables, singular poses, poses above the spools, then limits. The slack of a
+            criterion that does not apply is NaN or infinite.
         screen: the cheap test that comes before checks.
     """
 
@@ -113,7 +113,7 @@ class MotionChecker(abc.ABC):
     screen: Screen
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind, *, batch: int) -> None:
-        """Keep the problem, the kind of the motions, and the number of motions of a batch."""
+        """Store the problem, the kind of the motions, and the number of motions in a batch."""
         self.problem, self.kind, self.batch = problem, kind, batch
 
     def durations(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
@@ -126,13 +126,13 @@ class MotionChecker(abc.ABC):
         return PlatformChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
     def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Tolerated:
-        """Multiples of the uncertainty that motions tolerate, as closely as possible."""
+        """Multiples of the uncertainty that motions tolerate, as tightly bounded as possible."""
         return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
 
     def confirmed(
         self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], checks: PlatformChecks
     ) -> PlatformChecks:
-        """Checks of motions that passed, with a proof of each; here they are proofs already."""
+        """Checks of motions that passed, each with a proof; by default the checks themselves are proofs."""
         return checks
 
     @property
@@ -142,7 +142,7 @@ class MotionChecker(abc.ABC):
 
     @abc.abstractmethod
     def breaks(self, slack: Float[np.ndarray, "n n_criteria"]) -> Float[np.ndarray, "n n_criteria"]:
-        """Criteria that slacks break for certain."""
+        """Mask of the criteria that are certainly broken, given slacks."""
 
     @abc.abstractmethod
     def sampled(
@@ -160,13 +160,13 @@ class MotionChecker(abc.ABC):
         margins: bool = True,
         ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> PlatformChecks:
-        """Check motions in full."""
+        """Check motions in full, not by a screen alone."""
 
     @abc.abstractmethod
     def end_interval(
         self, position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"], z0: float
     ) -> tuple[float, float, float]:
-        """Values of beta-hat at which a segment can end in a pose."""
+        """Value of beta-hat to try first, and interval of values at which a segment can end at a pose."""
 
     @abc.abstractmethod
     def end_options(

@@ -1,9 +1,9 @@
-"""The rotation of a platform that swings: oscillating SLERP, thesis section 3.7.
+"""Rotation of an oscillating platform: oscillating SLERP, thesis section 3.7.
 
-The orientation runs back and forth through the reference orientation, between an envelope q_env and its
-inverse; the envelope goes slowly from the first orientation to the last, (3.59). With u the rotation vector of
-half the envelope's angle, q = exp(beta u): nothing is divided by an angle, so that small ones are no special case.
-The angle of the envelope stays within [0, pi], since both of its ends have a scalar part that is not negative.
+The orientation moves back and forth through the reference orientation, between an envelope q_env and its inverse; the
+envelope moves slowly from the first orientation to the last, (3.59). With u the rotation vector of half the envelope's
+angle, q = exp(beta u): no division by an angle, so small angles are no special case. The angle of the envelope stays
+within [0, pi], since the scalar parts of both of its ends are not negative.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from cspr_jax.numerics.elementary import length, polynomial, sincospi
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.shapes import Bool, Float, Num
 
-# Series replace quotients in which digits would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below `_NEAR`, by so
-# many terms, and sin(r) / r where r^2 is small.
+# Series replace quotients that lose digits by cancellation: of arccos(s) / sqrt(1 - s^2) if 1 - s is below `_NEAR`,
+# with this many terms, and of sin(r) / r if r^2 is small.
 _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 3))])]
 _SMALL, _SERIES = 0.5, 12
-# An envelope shorter than this does not turn.
+# An envelope with a smaller angle does not turn.
 _NO_ANGLE = 1e-12
 
 
@@ -33,12 +33,12 @@ class Slerp(NamedTuple):
     """Oscillating SLERP from one pose to another, for one parity of the number of arcs.
 
     Fields:
-        start: (4,) q_1.
-        across: (4,) unit quaternion at a right angle to q_1 towards the end of the envelope; zero if the envelope does
-            not turn.
+        start: (4,) q_1, a unit quaternion.
+        across: (4,) unit quaternion perpendicular to q_1 towards the end of the envelope; zero if the envelope does not
+            turn.
         angle: () Theta_env of (3.60), rad.
         start_beta_hat: () beta-hat of the first pose, (3.81).
-        end_beta_hat: () of the last.
+        end_beta_hat: () beta-hat of the last pose.
     """
 
     start: Array
@@ -65,7 +65,7 @@ def slerp_between(
     beside = beside - first * jnp.dot(first, beside)
     norm = length(beside)
     angle = jnp.arctan2(norm, along)
-    # Opposite ends are both half a turn from the reference orientation: the envelope goes through the latter.
+    # Opposite ends are both half a turn from the reference orientation: the envelope passes through it.
     identity = jnp.zeros_like(first).at[0].set(1.0)
     is_opposite = (norm < _NO_ANGLE) & (along < 0.0)
     across = jnp.where(norm < _NO_ANGLE, 0.0, beside / jnp.where(norm < _NO_ANGLE, 1.0, norm))
@@ -82,8 +82,8 @@ def rotation_law(
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
     """beta_ff of (3.93) and its first two derivatives in tau.
 
-    The function is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. With a
-    beta-hat of -1 / fraction it is beta_1 of (3.66), with 0 beta_0 of (3.67).
+    The function is linear in beta-hat, so the mean of two beta_f is the beta_f of the mean beta-hat. It is beta_1 of
+    (3.66) if beta-hat is -1 / fraction, and beta_0 of (3.67) if beta-hat is 0.
     """
     omega = math.pi * arcs
     h_rate = (end_beta_hat - start_beta_hat) * fraction
@@ -113,7 +113,7 @@ def orientation(
 
 
 def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
-    # Return half of the rotation vector of the envelope and its derivatives; the quaternions of the envelope lie in a
+    # Return half of the rotation vector of the envelope and its derivatives; all quaternions of the envelope lie in a
     # plane.
     a, a1, a2 = amplitude_values[:3]
     sine, cosine = sincospi(slerp.angle * a / math.pi)
@@ -127,7 +127,7 @@ def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Arr
 
 
 def angle_ratio(s: Float[Array, ""], square: Float[Array, ""], *, orders: int) -> tuple[Float[Array, ""], ...]:
-    """W = arccos(s) / sqrt(1 - s^2), and its derivatives in s, whose signs alternate."""
+    """W = arccos(s) / sqrt(1 - s^2), and its derivatives in s, which alternate in sign."""
     x = 1.0 - s
     is_near = x < _NEAR
     square = jnp.where(is_near, 1.0, square)
@@ -157,7 +157,7 @@ def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
 def sinc(
     y: Float[Array, ""],
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
-    """Cosine of r, sin r / r, and the first three derivatives of the latter in y = r^2."""
+    """Cosine of r, sin r / r, and the first three derivatives of sin r / r in y = r^2."""
     is_small = y < _SMALL
     large = jnp.where(is_small, 1.0, y)
     r = jnp.sqrt(large)

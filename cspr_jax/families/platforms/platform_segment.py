@@ -1,13 +1,13 @@
 """Point-to-point motions of a platform, thesis chapter 3: position and orientation together.
 
-The position is a hypocycloid of variable amplitude (3.44), or the standard one of chapter 2; the orientation an
-oscillating SLERP in step with it. In the precessing frame of `hypocycloid`, with s the sense, nu the ratio of the
+The position is a hypocycloid of variable amplitude (3.44), or the standard one of chapter 2; the orientation is an
+oscillating SLERP in phase with it. In the precessing frame of `hypocycloid`, with s the sense, nu the ratio of the
 ellipse's axes, S = theta_h^2 (n_h - 1) = T^2 lambda, C and S_ the cosine and sine of Phi = s pi p tau,
 
     c  = (r C - s r' S_ / (pi p)) e_r + nu r S_ e_t
     c' = S_ [-(r S + r'') s / (pi p) e_r + 2 nu r' e_t]
 
-so that the platform stands still at every cusp, not only at the ends as with the standard hypocycloid.
+so the platform is at rest at every cusp, and not only at the ends as with the standard hypocycloid.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.verification.bounds.swing_bounds import swing_bounds
 
-# Blocks of which bounds are computed at a time.
+# Number of blocks whose bounds are computed at a time.
 BATCH = 64
 
 
@@ -56,12 +56,12 @@ class PlatformSegment:
         center: (3,) the point p0, m.
         start_radius: () r1 of (3.46), m.
         end_radius: () r2, m.
-        precession: () of the ellipse, in half turns, in [0, 1].
+        precession: () angle by which the ellipse precesses, in half turns, in [0, 1].
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
-        slerp: of the orientation.
+        slerp: oscillating SLERP of the orientation.
         regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
-            for a robot on more than six cables, which has no determinant.
+            on more than six cables, where there is no determinant.
     """
 
     plane: Array
@@ -192,10 +192,10 @@ class PlatformMotion:
     """Motion of a platform between two poses; see `Motion`.
 
     Fields:
-        segment: of the parity of `arcs`.
-        amplitude: A.
+        segment: segment of the parity of `arcs`.
+        amplitude: amplitude function A.
         arcs: () number of arcs, a float.
-        kind: of the motion; known when a function is compiled.
+        kind: kind of the motion; static when functions are compiled.
     """
 
     segment: PlatformSegment
@@ -236,7 +236,7 @@ def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: 
 
 @persistent_jit(static_argnames="kind")
 def batch_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
-    """Bounds of the states of several motions, over one block of each."""
+    """Bounds of the states of a batch of motions, each over one block."""
     return jax.vmap(partial(_block_bounds, kind))(*cases)
 
 
@@ -249,8 +249,8 @@ def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Arra
 
 
 def take_segments(segments: PlatformSegment, index: np.ndarray) -> PlatformSegment:
-    """Segments chosen from many."""
-    # `take` is four times as fast as an index where an array is no vector.
+    """Segments selected from a batch."""
+    # `take` is four times as fast as indexing unless the array is a vector.
     index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
     return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
 
@@ -259,7 +259,7 @@ class Motions(NamedTuple):
     """Motions of a platform.
 
     Fields:
-        segments: arrays (n, ...), of the parity of `arcs`.
+        segments: arrays (n, ...), each of the parity of `arcs`.
         arcs: (n,) number of arcs of each.
     """
 
@@ -267,9 +267,9 @@ class Motions(NamedTuple):
     arcs: np.ndarray
 
     def take(self, index: np.ndarray) -> "Motions":
-        """Motions chosen by indices, or by a mask (n,)."""
+        """Motions selected by indices, or by a mask (n,)."""
         return Motions(take_segments(self.segments, index), self.arcs[index])
 
     def items(self, index: Float[np.ndarray, "m"]) -> tuple[PlatformSegment, np.ndarray]:
-        """Chosen motions as kernels take them."""
+        """Selected motions in the form for kernels."""
         return take_segments(self.segments, index), self.arcs[index].astype(float)

@@ -1,6 +1,6 @@
-"""The state of many moving platforms, one lane a segment: the fast form of `platform_segment.motion`.
+"""States of many platforms, one lane a segment: the fast form of `platform_segment.motion`.
 
-The mechanics are the same (tests compare both forms), written for numbers instead of small vectors. A transition from
+The mechanics are the same (tests compare both forms), written with numbers instead of small vectors. A transition from
 rest needs neither an ellipse nor a quaternion: it is a straight swing and a rotation about one axis.
 """
 
@@ -31,13 +31,13 @@ from cspr_jax.numerics.linear.lanes import (
 )
 from cspr_jax.numerics.shapes import Float, Num
 
-# Degree of the Chebyshev fits, on s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they
-# are accurate to 2e-15. The derivative of the fit of W would be wrong by 3e-10.
+# Degree of Chebyshev fits, for s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they are
+# accurate to 2e-15. The derivative of the fit of W instead would be wrong by 3e-10.
 _DEGREE = 22
 
 
 class PhaseLanes(NamedTuple):
-    """Normalised time, and quantities that depend on it and on the number of arcs alone: () or (n,) each.
+    """Normalised time, and what depends only on it and on the number of arcs: () or (n,) each.
 
     Fields:
         tau: normalised time.
@@ -45,8 +45,8 @@ class PhaseLanes(NamedTuple):
         a1: A'.
         a2: A''.
         a3: A'''.
-        sine: of the angle sense pi p tau.
-        cosine: of that angle.
+        sine: sine of the angle sense pi p tau.
+        cosine: cosine of the same angle.
     """
 
     tau: Array
@@ -59,10 +59,10 @@ class PhaseLanes(NamedTuple):
 
 
 class StateLanes(NamedTuple):
-    """The platform at one time of n segments: tuples of (n,) arrays, derivatives in normalised time.
+    """States of n segments at one time: tuples of (n,) arrays; derivatives in normalised time.
 
     Fields:
-        position: m.
+        position: position of the mass centre, m.
         velocity: p', m.
         acceleration: p'', m.
         rotation: rows of the rotation matrix.
@@ -82,7 +82,7 @@ class StateLanes(NamedTuple):
 def phase_lanes(
     amplitude: Amplitude, sense: Float[Array, "..."], arcs: Num[Array, "..."], tau: Float[Array, "..."]
 ) -> PhaseLanes:
-    """Phase common to segments of the same number of arcs."""
+    """Phase of segments with the same number of arcs."""
     a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
     return PhaseLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
@@ -180,7 +180,7 @@ def _rotation_law(
 def _about_one_axis(
     segment: PlatformSegment, phase: PhaseLanes, betas: tuple[Array, ...], one: Array | None
 ) -> tuple[Matrix, Vector, Vector]:
-    # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
+    # From the reference orientation the envelope turns about one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = betas
     full = 2.0 * segment.slerp.angle
@@ -191,7 +191,7 @@ def _about_one_axis(
 
 
 def _angle_ratio_coefficients() -> list[list[float]]:
-    # Fit powers of x = 1 - s to the series of W and of its derivatives in x, which are exact.
+    # Fit polynomials in x = 1 - s to the exact series of W and of its derivatives in x.
     terms = np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(120))])
     nodes = np.polynomial.chebyshev.chebpts1(64) * 0.5 + 0.5
     coefficients = []

@@ -1,4 +1,4 @@
-"""Smallest numbers of arcs of motions of a platform to many poses, over values of beta-hat at their ends."""
+"""Smallest numbers of arcs of a platform's motions to many poses, over values of beta-hat at the ends."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
-# Time functions of the rotation that take a separate beta-hat at each end; None stands for the default.
+# Rotation laws with a separate beta-hat at each end; None is the default law.
 _SEPARATE = (None, "beta_ff")
 Poses = tuple[np.ndarray, np.ndarray]
 
@@ -29,8 +29,8 @@ def rest_poses(z0: Float[np.ndarray, "n"]) -> Poses:
 
 
 def start_beta_hat(checker: MotionChecker, starts: Poses, z0: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Beta-hat at starts beyond P0: the preferred one, of (3.91) or of the largest margin, else that at rest."""
-    # Compute the options once for each of the few different starts.
+    """Beta-hat at starts: the preferred one, of (3.91) or of the largest margin; if there is none, that at rest."""
+    # There are few different starts: compute the options once for each.
     distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
     values = checker.end_options(distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
     return np.where(np.isnan(values), AT_REST, values)[inverse.ravel()]

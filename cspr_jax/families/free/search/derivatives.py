@@ -32,7 +32,7 @@ POWERS = np.arange(3.0)
 
 
 class EquationValues(NamedTuple):
-    """Those parts of the residuals at samples that depend on the state and on tensions, with derivatives.
+    """Residuals at samples, without the parts that depend on other values, and their derivatives.
 
     Derivatives are by x: the coordinates, their first and second derivatives in normalised time, the duration, and the
     level of the objective; the equations do not depend on the level.

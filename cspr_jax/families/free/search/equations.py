@@ -31,9 +31,9 @@ from cspr_jax.verification.criteria import BELOW, Criterion, pose_conditions
 BATCH = 128
 # Number of entries of x after the coordinates and their derivatives.
 SCALARS = 2
-# Derivatives of the pose on which quantities depend.
+# Highest derivative of the pose on which a quantity depends.
 ORDERS = {"depth": 0, "length": 0, "speed": 1, "mass_centre_speed": 1, "acceleration": 2, "mass_centre_acceleration": 2}
-# Smallest depth below the plane of the spools, over the robot's radius, that a search allows.
+# Smallest depth below the spool plane that a search allows, over the robot's radius.
 DEPTH = 0.02
 
 
@@ -102,11 +102,11 @@ class ValueBounds(NamedTuple):
     """Bounds of the values at one time, and how criteria tighten them.
 
     Fields:
-        low: (n_values,) -inf for none.
-        high: (n_values,) inf for none.
-        rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
-        falls: (n_criteria, n_values) by how much an upper bound falls.
-        orders: (n_values,) up to which derivative of the pose a value depends on it, 3 where it does on tensions, too.
+        low: (n_values,) lower bounds, -inf for none.
+        high: (n_values,) upper bounds, inf for none.
+        rises: (n_criteria, n_values) increase of a lower bound that increases the slack of a criterion by 1.
+        falls: (n_criteria, n_values) decrease of an upper bound that does the same.
+        orders: (n_values,) highest derivative of the pose on which a value depends; 3 if it depends on tensions, too.
         determinant: index of the value that is the determinant; None without one.
         depth: index of the value that is the depth below the spool plane, over the robot's radius; None without such a
             plane.
@@ -122,7 +122,7 @@ class ValueBounds(NamedTuple):
 
 
 class _Value(NamedTuple):
-    # A value: its bounds, their criteria, its cable or -1, how much it changes when the slack grows by 1, its order.
+    # A value: its bounds, their flags, its cable or -1, its change when the slack grows by 1, and its order.
     low: float
     high: float
     low_flag: Verdict
@@ -138,7 +138,7 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     infeasible, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
     low, high = (np.asarray(side) / weight for side in tension_range(robot, limits))
     slack, over = Verdict.SLACK_CABLE | infeasible, Verdict.OVER_TENSION | infeasible
-    # Redundant cables leave tensions open.
+    # The motion does not determine tensions of redundant cables.
     order = 2 if robot.n_cables == robot.dof else 3
     values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight, order) for k in numbers]
     for limit in other_limits(limits):
@@ -158,7 +158,7 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0, 3))
     if is_regular:
-        # The determinant keeps its sign at the poses: `poses.tasks_of` sets that bound, as it does for the depth.
+        # The determinant keeps the sign that it has at the poses: `poses.tasks_of` bounds it, as it does the depth.
         values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0, 0))
 
     def changes(side: str, bound: str) -> np.ndarray:

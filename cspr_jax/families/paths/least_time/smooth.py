@@ -122,11 +122,11 @@ def smooth(half_planes: NodeHalfPlanes, ends: SectionEnds, start: Smooth, jerk: 
 def below_ramps(
     x: Float[np.ndarray, "n_nodes"], width: Float[np.ndarray, "n_nodes-1"], jerk: float, ends: SectionEnds
 ) -> Smooth:
-    """Motion that is no faster than another one, nor than ramps from rest and to rest are."""
+    """Motion at most as fast as another one, and as ramps from rest and to rest."""
     s = np.concatenate([[0.0], np.cumsum(width)])
     x = x.copy()
     for distance, rest in zip((s, s[-1] - s), ends.rests, strict=True):
-        # s = J t^3 / 6
+        # Ramp from rest: s = J t^3 / 6.
         x = np.minimum(x, (0.5 * jerk) ** 2 * (6.0 * distance / jerk) ** (4.0 / 3.0)) if rest else x
     x[1:-1] = np.maximum(x[1:-1], SMALLEST * x.max())
     x[[0, -1]] = ends.speeds
@@ -134,7 +134,7 @@ def below_ramps(
 
 
 class _Time(NamedTuple):
-    # The duration, its gradient in x, and the diagonals of its Hessian: of x with itself, and with the next x.
+    # The duration, its gradient in x, and the diagonals of its Hessian: for x itself, and for x and the next x.
     value: float
     gradient: np.ndarray
     hessian: np.ndarray
@@ -142,7 +142,7 @@ class _Time(NamedTuple):
 
 
 def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
-    # Cells take 2 D / (sqrt x0 + sqrt x1), one at rest 3 D / sqrt x. An x of zero is fixed.
+    # Cells take 2 D / (sqrt x0 + sqrt x1); a cell from or to rest takes 3 D / sqrt x. A zero x is fixed.
     moves = x > 0.0
     speed = np.sqrt(np.where(moves, x, 1.0))
     both = np.where(moves, speed, 0.0)[1:] + np.where(moves, speed, 0.0)[:-1]
@@ -157,23 +157,23 @@ def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
 
 
 class _Tangents(NamedTuple):
-    # Tangents of the limit of the path jerk: +-(u1 - u0) of_u + (x0 + x1) of_x <= 1, (n_cells,).
+    # Tangents to the limit of the path jerk: +-(u1 - u0) of_u + (x0 + x1) of_x <= 1, (n_cells,).
     of_u: np.ndarray
     of_x: np.ndarray
 
 
 def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, bool]) -> _Tangents:
     middle = 0.5 * (x[1:] + x[:-1])
-    # 1 / sqrt x is above its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
+    # 1 / sqrt x is not below its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
     of_u, of_x = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
     for end, rest in zip((0, -1), rests, strict=True):
-        if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
+        if rest:  # the jerk in the cell is 2 x^1.5 / 9 D^2
             of_u[end], of_x[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
     return _Tangents(of_u, of_x)
 
 
 class _Problem:
-    # Unknowns are x, u, and the multiplier of the equation of the cell that follows, (n_nodes, 3).
+    # Unknowns are x, u, and the multiplier of the equation of the next cell, (n_nodes, 3).
     def __init__(self, half_planes: NodeHalfPlanes, ends: SectionEnds, jerk: float, x: np.ndarray) -> None:
         self.ends, self.width = ends, half_planes.width
         self.tangents = _tangents(x, half_planes.width, jerk, ends.rests)
@@ -186,7 +186,7 @@ class _Problem:
         one = np.ones(count - 1)
         self.cells = np.array([[-one, -half_planes.width], [one, -half_planes.width]])
         for end, rest in zip((0, -1), ends.rests, strict=True):
-            if rest:  # u D is 2/3 x towards rest
+            if rest:  # |u| D is 2/3 x beside a rest
                 self.cells[:, :, end] = 0.0
                 self.cells[1 + end, :, end] = 2.0 / 3.0, -half_planes.width[end] * (1.0 + 2.0 * end)
 
@@ -233,7 +233,7 @@ class _Problem:
         return np.where(self.free, residual, 0.0)
 
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
-        # Matrix of neighbouring nodes: (row, column) of one node, and (row of one, column of the next).
+        # Blocks of the matrix: (row, column) at one node, and (row at one node, column at the next).
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
         diagonal, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
@@ -258,7 +258,8 @@ class _Problem:
         ).reshape(z.shape)
 
     def _banded(self, diagonal: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-        # Banded matrix as SciPy takes it: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
+        # Banded matrix in SciPy's form: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of the
+        # identity.
         free = self.free.T
         diagonal = np.where(free[:, None] & free[None], diagonal, np.eye(3)[:, :, None])
         ahead = np.where(free[:, None, :-1] & free[None, :, 1:], ahead, 0.0)

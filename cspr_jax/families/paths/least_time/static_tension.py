@@ -1,4 +1,4 @@
-"""Tension that keeps a robot from standing still at a point."""
+"""Tension that prevents a robot from being at rest at a point."""
 
 from typing import Any, NamedTuple
 
@@ -10,18 +10,18 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_sets import tension_range
 
-MISSED = 1e-9  # over the weight, by which tensions must miss their limits
-DIGITS = 4  # of numbers in words
+MISSED = 1e-9  # smallest violation of a tension's limit that counts, over the weight
+DIGITS = 4  # digits of numbers in messages
 
 
 class StaticTension(NamedTuple):
-    """Tension that static equilibrium needs, of those that come nearest to their limits.
+    """Tension that breaks its limit in static equilibrium; the equilibrium has the smallest possible violations.
 
     Fields:
-        cable: from 0 on.
-        needed: N.
-        allowed: N.
-        is_largest: whether it is above the largest tension, and not below the smallest one.
+        cable: index of the cable, from 0.
+        needed: tension in the equilibrium, N.
+        allowed: limit that it breaks, N.
+        is_largest: whether it is above the largest allowed tension, and not below the smallest one.
         position: (3,) the point, m.
     """
 
@@ -33,14 +33,14 @@ class StaticTension(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The tension in words."""
+        """The tension and its limit in words."""
         needed, allowed = (f"{value:.{DIGITS}g}" for value in (self.needed, self.allowed))
         if self.is_largest:
             return f"a tension of {needed} N is needed in cable {self.cable + 1}, {allowed} allowed"
         return f"cable {self.cable + 1} has a tension of {needed} N, at least {allowed} needed"
 
     def to_dict(self) -> dict[str, Any]:
-        """The tension as a plan's JSON has it."""
+        """The tension as the JSON of a plan has it."""
         return self._asdict() | {"position": self.position.tolist(), "unit": "N"}
 
 
@@ -50,7 +50,7 @@ def static_tension(problem: Problem, state: State) -> StaticTension | None:
     wrenches, count = unit_wrenches(robot, state), robot.n_cables
     low, high = (np.broadcast_to(side, count) for side in tension_range(robot, problem.limits))
     matrix, rest = np.asarray(wrenches.matrix, float), np.asarray(wrenches.rest, float)
-    # Tensions, and by how much they may miss their limits.
+    # Unknowns are the tensions, and the amount by which they may break their limits.
     has_high = np.isfinite(high)
     sides = np.vstack([-np.eye(count), np.eye(count)[has_high]])
     table = np.hstack([sides, -np.ones((len(sides), 1))])

@@ -1,4 +1,4 @@
-"""Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
+"""Limits that a motion along a path breaks between the nodes, according to proof, and limits that bind it."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.piece_slacks import Sides, close_bounds
 from cspr_jax.verification.proved_answers import TENSIONS
 
-LEFT = 1e-7  # slack over its scale that counts as met
-MORE, STEP = 1.3, 1e-5  # margins grow by this multiple of the missing slack, and by this besides
-BINDING = 0.01  # slack over its scale below which a criterion binds
-# After the first round, margins also grow in this fraction of the grid's cells on each side.
+LEFT = 1e-7  # a criterion counts as met if its slack over its scale is above this
+MORE, STEP = 1.3, 1e-5  # margins grow by this multiple of the missing slack plus this
+BINDING = 0.01  # a criterion binds if its slack over its scale is below this
+# After the first round, margins also grow in the nearest n_cells / SPREAD cells on each side.
 SPREAD = 150
-# Times that a cell is halved.
+# Number of times that a cell is halved.
 HALVINGS = 3
-# Criteria that faster or slower motion changes, by their units.
+# Units of criteria on speeds and on accelerations, which depend on how fast a motion is.
 SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
 Answer = TypeVar("Answer")
 
 
 class Trial(NamedTuple):
-    """Motion whose slacks are asked for.
+    """Motion whose slacks are to be bounded.
 
     Fields:
-        motion: with a piece a cell.
+        motion: motion with one piece for each cell.
         feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
     """
 
@@ -45,12 +45,12 @@ class Trial(NamedTuple):
 
 
 class BindingName(NamedTuple):
-    """Name of a criterion that can bind.
+    """Name of a criterion that can bind a motion.
 
     Fields:
-        criterion: name of its flag.
-        cable: from 0 on; None: of no single cable.
-        feed: in the words of G-code, such as "F6000"; "" for other criteria.
+        criterion: name of the criterion's flag.
+        cable: index from 0; None if it is about no single cable.
+        feed: words of G-code for a feed, such as "F6000"; "" for other criteria.
     """
 
     criterion: str
@@ -68,8 +68,8 @@ class CellSlacks(NamedTuple):
 
     Fields:
         criteria: criteria of tensions, speeds and accelerations.
-        low: (n_cells, n_rows) lower bounds; of tensions over the weight, of others over what is allowed.
-        high: (n_cells, n_rows) upper bounds of the smallest slacks.
+        low: (n_cells, n_rows) lower bounds; tensions over the weight, all else over its limit.
+        high: (n_cells, n_rows) upper bounds of the smallest slack in each cell.
     """
 
     criteria: list[Criterion]
@@ -82,8 +82,8 @@ class CellSlacks(NamedTuple):
         return bool((self.low > 0.0).all())
 
     def grown(self, margins: GridMargins, weight: float) -> GridMargins:
-        """Larger margins, with which criteria that are missed should be met."""
-        # Tightening one cell can move a violation to the next cell: let margins grow around it, too.
+        """Larger margins, which should make the motion meet the criteria that it breaks."""
+        # Tightening one cell may move a violation to the next cell: let margins grow around it, too.
         radius = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
 
         def lacking(chosen: list[bool]) -> np.ndarray:
@@ -113,7 +113,7 @@ class CellSlacks(NamedTuple):
 
 
 def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
-    """Bounds of slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds."""
+    """Bounds of slacks that depend on how fast motions are, on each of their pieces; the last is that of feeds."""
     motions = [trial.motion for trial in trials]
     robot, limits, splines = problem.robot, problem.limits, SplineBatch(motions)
     all_criteria = criteria(robot, limits)
@@ -136,7 +136,7 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
         below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
         if not has_feed:
             return below, above
-        # The lower end of a line above a slack is above its smallest value.
+        # The lower end of a line above a slack is not below the smallest slack.
         speeds, scale = speed_slacks(states), feed[cell, None]
         sides = 1.0 + speeds.low / scale, 1.0 + (speeds.high - np.abs(speeds.high_rise)) / scale
         return np.hstack([below, sides[0]]), np.hstack([above, sides[1]])
@@ -148,7 +148,7 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
 
 
 def together(problem: Problem, searches: Sequence[Generator[Trial, CellSlacks, Answer]]) -> list[Answer]:
-    """Results of searches that continue with bounds of their motions' slacks, bounded together round by round."""
+    """Results of searches that ask for bounds of slacks of motions; all bounds of a round are computed together."""
     answers: dict[int, Answer] = {}
     trials: dict[int, Trial] = {}
 

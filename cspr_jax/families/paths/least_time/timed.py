@@ -1,7 +1,7 @@
 """Motion along a path in time: quintic pieces through positions, velocities and accelerations at the nodes.
 
-Controllers play this motion, and this one is proved. It meets the path at the nodes; `distance_from_path` says how far
-it leaves the path between them.
+This motion is what controllers play, and what is proved. It is on the path at the nodes; `distance_from_path` tells how
+far from the path it is between them.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, poin
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 
-# Times in a cell at which the distance from the path is taken.
+# Fractions of the time of a cell at which the distance from the path is measured.
 FRACTIONS = (0.25, 0.5, 0.75)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 class PathSpeeds(NamedTuple):
-    """How fast a section is run along.
+    """Path speeds and accelerations of a motion along a section.
 
     Fields:
         x: (n_nodes,) squared path speeds.
         before: (n_cells,) path accelerations at the starts of the cells.
-        after: (n_cells,) at their ends.
-        rests: whether start and end are at rest: s is the cube of time over the cell there.
+        after: (n_cells,) path accelerations at the ends of the cells.
+        rests: whether the motion is at rest at the start, and at the end; s is the cube of time over the cell there.
     """
 
     x: np.ndarray
@@ -39,15 +39,15 @@ class PathSpeeds(NamedTuple):
 
 
 def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
-    """Times that the cells take, where the path acceleration changes at a constant rate along each."""
-    # With s - s0 = D r^2 at a start from zero speed, and D (1 - (1 - r)^2) at an end, nothing is singular.
+    """Times of the cells, on which the path acceleration changes at a constant rate over s."""
+    # Substitute s - s0 = D r^2 at a start from zero speed, and D (1 - (1 - r)^2) at such an end: nothing is singular.
     r, weights = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
     starts, ends = (run.x[:-1] == 0.0)[:, None], (run.x[1:] == 0.0)[:, None]
     fraction = np.where(starts, r**2, np.where(ends, 1.0 - (1.0 - r) ** 2, r))
     derivative = np.where(starts, 2.0 * r, np.where(ends, 2.0 * (1.0 - r), 1.0))
     u_change = (run.after - run.before)[:, None]
     x = run.x[:-1, None] + 2.0 * width[:, None] * (run.before[:, None] * fraction + 0.5 * u_change * fraction**2)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of cells that no motion runs through
+    with np.errstate(invalid="ignore", divide="ignore"):  # for cells that no motion traverses
         times = width * np.sum(weights * derivative / np.sqrt(x), axis=1)
     for end, rest in zip((0, -1), run.rests, strict=True):
         if rest:
@@ -56,12 +56,12 @@ def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np
 
 
 def moving(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
-    """Path speeds that run through all cells."""
+    """Path speeds, if they let a motion traverse all cells; else None."""
     return run if np.isfinite(cell_times(run, width)).all() else None
 
 
 def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
-    """The motion."""
+    """The motion over time."""
     times = cell_times(run, grid.width)
     speeds = np.sqrt(run.x)
     sides = [
@@ -87,16 +87,16 @@ def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
 
 
 def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
-    # Bernstein coefficients (n_cells, 6, k) from values and two derivatives at both ends.
+    # Return Bernstein coefficients (n_cells, 6, k) from values and two derivatives at both ends.
     (p, v, a), (q, w, b) = start, end
     one, two = width / 5.0, width**2 / 20.0
     return np.stack([p, p + one * v, p + 2.0 * one * v + two * a, q - 2.0 * one * w + two * b, q - one * w, q], axis=1)
 
 
 def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion: Spline) -> float:
-    """Largest distance of the motion from the path, at some times of each cell."""
+    """Largest distance of the motion from the path, at some times in each cell."""
     times, speeds = np.diff(motion.knots), np.sqrt(run.x)
-    # The path coordinate as a quintic in time too; across the path its error is of no account.
+    # Approximate the path coordinate by a quintic in time as well; its error hardly changes the distance.
     ends = (grid.nodes[:-1], speeds[:-1], run.before), (grid.nodes[1:], speeds[1:], run.after)
     first, last = (tuple(x[:, None] for x in end) for end in ends)
     path_coordinate = _quintic(first, last, times[:, None])
@@ -104,7 +104,7 @@ def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion
     for fraction in FRACTIONS:
         values = [_at(table, fraction) for table in (path_coordinate, np.asarray(motion.position))]
         position, ahead, _ = derivatives(points_on(section.curve, values[0][:, 0], ahead=True))[0]
-        # A body that turns on the spot has no direction.
+        # A body that only turns has no direction of motion.
         norms = np.linalg.norm(ahead, axis=1, keepdims=True)
         off, along = values[1] - position, ahead / np.where(norms > 0.0, norms, 1.0)
         off = off - np.sum(off * along, axis=1, keepdims=True) * along

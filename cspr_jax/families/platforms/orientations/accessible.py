@@ -1,8 +1,8 @@
 """Accessible orientations of a platform at a position, thesis section 3.10.2, by three definitions.
 
-"grid": the multiples of the step of tilt and torsion that chains of neighbours join to the reference orientation.
-"scan": Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of
-equal volume of SO(3); only by this definition is the number of orientations proportional to a volume.
+"grid": multiples of the step of tilt and torsion that chains of neighbours connect with the reference orientation.
+"scan": Bonev's scan as in the thesis, along rays from a moving centre. "equal-volume": like "grid", on cells of equal
+volume of SO(3); only then is the number of orientations proportional to a volume.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
-# Steps along a ray that are tried at a time: few rays are longer, and with the usual number of rays these steps fill
+# Number of steps along a ray tried at a time: few rays are longer, and with the usual number of rays these steps fill
 # three batches of `OrientationSteps`.
 RAY_STEPS = 23
 SO3_VOLUME = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma
@@ -36,8 +36,8 @@ class Accessible(NamedTuple):
 
     Fields:
         angles: (n, 3) tilt and torsion in the cylindrical frame of the position, rad.
-        volume: (n,) part of SO(3) that each orientation stands for.
-        of_points: part of all grid points; NaN for a scan, which has no grid.
+        volume: (n,) fraction of SO(3) that each orientation represents.
+        of_points: fraction of all grid points that are accessible; NaN for a scan, which has no grid.
     """
 
     angles: np.ndarray
@@ -75,7 +75,7 @@ def accessible_sets(robot: PlatformRobot, grids: Sequence[tuple[np.ndarray, int]
 
 
 def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    # Scan sections of constant torsion, from 0 up and from 0 down; each starts at the centre of the section before.
+    # Scan sections of constant torsion upwards and downwards from 0; each starts at the centre of the previous section.
     step = math.pi / divisions
     part, first = _section(steps, towards, np.zeros(2), 0.0, divisions)
     yield part
@@ -94,7 +94,7 @@ def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Itera
 def _section(
     steps: OrientationSteps, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    # Go along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that is impossible.
+    # Follow rays in the polar plane (theta cos phi, theta sin phi) up to the first impossible step.
     step, count = math.pi / divisions, 2 * divisions
     azimuth = np.arange(count) * step
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
@@ -110,14 +110,14 @@ def _section(
     ends = centre + (made * step)[:, None] * rays
     ray, last = np.nonzero(np.arange(count) < made[:, None])
     reached = _angles(centre + far[last + 1, None] * rays[ray], np.asarray(torsion))
-    # Each orientation stands for a sector of the plane, where the measure is sin(theta) / theta.
+    # Each orientation represents a sector of the plane, where the measure is sin(theta) / theta.
     volume = far[last + 1] * np.sinc(reached[:, 1] / math.pi) * step**3 / SO3_VOLUME
     return (reached, volume), ends.mean(0)
 
 
 def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    # Take orientations along rays, (n, m + 1, 3); return the mask (n, m) of steps that are possible with all steps
-    # before them.
+    # Take orientations along rays, (n, m + 1, 3); return the mask (n, m) of steps that are possible with all earlier
+    # steps.
     samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
     index = np.arange(angles[..., 0].size).reshape(len(angles), -1)
     free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(len(angles), -1)

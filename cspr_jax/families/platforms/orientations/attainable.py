@@ -16,14 +16,14 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.symmetries import NONE, Symmetries, alike
 
-# Values of beta-hat tried at the target.
+# Number of values of beta-hat tried at the target.
 VALUES = 20
 # The preferred value is tried first, then every fifth of the others, then the rest.
 FEWER = 5
-# Cases of a part, enough to fill batches.
+# Numbers of cases in a part of the work, enough to fill batches.
 LARGE = 4 * CANDIDATES  # candidates of a search for the smallest numbers of arcs
 PART = CANDIDATES // 4  # motions of a search that only tells whether there is one
-MIXED = 16  # stride by which orientations are spread over the parts of such a search
+MIXED = 16  # stride that spreads orientations over the parts of such a search
 
 
 def attainable(
@@ -59,9 +59,9 @@ def attained(
     tried: Int[np.ndarray, "k"] | None = None,
     symmetry: Symmetries = NONE,
 ) -> Float[np.ndarray, "n"]:
-    """Orientations at positions that some number of arcs and some value of beta-hat attains.
+    """Orientations at positions that are attained with some number of arcs and some value of beta-hat.
 
-    `attainable` also tells how, or why not; this function does half of the work.
+    `attainable` also tells how, or why not; this function takes half as long.
     """
     representatives, inverse = _once(positions, angles, z0, symmetry)
     each = rounds(values) if tried is None else (tried,)
@@ -79,7 +79,7 @@ def attained(
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 
-    # Some positions take longer than others: each part gets orientations of all.
+    # Some positions take longer than others: give each part orientations of all positions.
     mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
     flags = np.empty(len(representatives), bool)
     representatives[:] = representatives[mixed]
@@ -88,13 +88,13 @@ def attained(
 
 
 def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails."""
+    """Rounds of values of beta-hat, each tried with every number of arcs where the previous round fails."""
     numbers = np.arange(1, values)
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
 def _once(positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
-    # Find the orientations that represent all, and the index of each orientation's representative among them.
+    # Find representatives of all orientations, and the index of each orientation's representative.
     representatives, inverse = np.unique(alike(symmetry, np.c_[positions, z0], angles), return_inverse=True)
     return representatives, inverse.ravel()
 

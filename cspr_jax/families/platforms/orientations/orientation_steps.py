@@ -1,7 +1,8 @@
-"""Cables at poses of a platform at rest, and between neighbouring ones, thesis section 3.10.2.
+"""Cables at poses of a platform at rest, and on steps between neighbouring poses, thesis section 3.10.2.
 
-On more than six cables the wrench matrix has no determinant whose sign a path could change: a pose is regular where
-the rank is full, on either side of the spools, and the platform is met only where its attachment points lie in a plane.
+On more than six cables the wrench matrix has no determinant whose sign could change along a path: a pose is regular if
+the rank is full, on either side of the spools, and cables can touch the platform only if its attachment points lie in a
+plane.
 """
 
 from __future__ import annotations
@@ -31,22 +32,22 @@ from cspr_jax.robots.statics.wrench_balance import at_rest, determinant_ratio, i
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 
 BATCH = 512
-# Gaps between cables below this fraction of the platform's radius count as zero. A cable that makes a smaller angle
-# with the platform lies in it, and counts as still on the side on which it is in the reference orientation.
+# Distances between cables below this fraction of the platform's radius count as zero. A cable at a smaller angle to
+# the platform lies in it, and counts as on the same side as in the reference orientation.
 TOUCHING = 1e-9
-# Steps between neighbours that are held at a time.
+# Number of steps between neighbours in memory at a time.
 STEPS = 65536
 
 
 class OrientationSamples(NamedTuple):
-    """Determinants and vectors of cables of n poses.
+    """Determinants, and vectors of cables, of n poses.
 
     Fields:
-        fraction: (n,) determinant over the determinant of the reference orientation at the same position; NaN where the
-            reference orientation is singular itself, or the position is not below the spools. On more than six cables
-            the root of the determinant of the matrix times its transpose.
+        fraction: (n,) determinant over that of the reference orientation at the same position; NaN if the reference
+            orientation itself is singular, or the position is not below the spools. On more than six cables, the root
+            of the determinant of the matrix times its transpose.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
-        cable_directions: (n, n_cables, 3) cables seen from the platform, m.
+        cable_directions: (n, n_cables, 3) vectors of the cables in platform axes, m.
     """
 
     fraction: np.ndarray
@@ -81,7 +82,7 @@ def _volumes(robot: PlatformRobot, positions: Array, quaternions: Array) -> Arra
 
 
 def reference_determinant(robot: PlatformRobot, position: Float[np.ndarray, "3"]) -> float:
-    """Determinant of the reference orientation at a position, if its sign is the same as in the middle."""
+    """Determinant of the reference orientation at a position; NaN beyond a singularity, or not below the spools."""
     if robot.n_cables > robot.dof:
         return 1.0
     current, depth, fraction = _upright(robot, np.asarray(position, float))
@@ -99,12 +100,12 @@ class OrientationSteps:
     """Steps between orientations of a platform at one position.
 
     Args:
-        robot: in its reference axes.
-        position: (3,) of the mass centre, m.
+        robot: robot in its reference axes.
+        position: (3,) position of the mass centre, m.
     """
 
     def __init__(self, robot: PlatformRobot, position: np.ndarray) -> None:
-        """Find which cables can meet each other or the platform."""
+        """Find which cables can touch each other or the platform."""
         self._robot, self._position = robot, np.asarray(position, float)
         self._contacts: Contacts = contacts(robot)
         self._is_flat = robot.n_cables == robot.dof or has_sectors(robot, default_scene(robot))
@@ -117,15 +118,15 @@ class OrientationSteps:
         self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
     def at(self, quaternions: Float[np.ndarray, "n 4"]) -> OrientationSamples:
-        """Determinants and vectors of cables of orientations."""
+        """Determinants and vectors of cables for orientations."""
         positions = np.broadcast_to(self._position, (len(quaternions), 3))
         sampled = in_batches(
             partial(_sampled, self._robot, pairs=self._pairs), (positions, np.asarray(quaternions)), batch_size=BATCH
         )
         fraction, gaps, directions = sampled
-        # Cables that touch have a gap of rounding errors, whose direction means nothing.
+        # The distance of cables that touch is a rounding error, whose direction has no meaning.
         gaps[_squares(gaps) < (TOUCHING * self._radius) ** 2] = 0.0
-        # Neither does the sign of the height of cables that lie in the platform: they are put on one side of it.
+        # Neither has the sign of the height of cables that lie in the platform: put them all on one side.
         height, minimum = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
         height = np.where(np.abs(height) < minimum, 2.0 * minimum * self._side - height, 0.0)
         return OrientationSamples(
@@ -139,7 +140,7 @@ class OrientationSteps:
     def passable(
         self, samples: OrientationSamples, first: Int[np.ndarray, "n"], last: Int[np.ndarray, "n"]
     ) -> Bool[np.ndarray, "n"]:
-        """Possible steps from one orientation to a neighbouring one."""
+        """Tell which steps from orientations to neighbouring ones are possible."""
         is_regular = self.regular(samples)
         open_steps = np.flatnonzero(is_regular[first] & is_regular[last])
         free = np.zeros(len(first), bool)
@@ -153,5 +154,5 @@ class OrientationSteps:
 
 
 def _squares(vectors: np.ndarray) -> np.ndarray:
-    # Square the lengths of vectors; three components are too few for a reduction along the last axis to be fast.
+    # Return squared lengths of vectors; with only three components, a reduction along the last axis would be slow.
     return np.einsum("...k,...k->...", vectors, vectors)

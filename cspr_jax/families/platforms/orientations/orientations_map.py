@@ -1,4 +1,4 @@
-"""Maps of the orientations that a platform can take at positions, of those that it attains, and of the arcs to each."""
+"""Maps of the orientations that a platform can have at positions, of those that it attains, and of the arcs to each."""
 
 import math
 
@@ -19,7 +19,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES, REFUSALS, TILT_TORSION
 from cspr_jax.schema.verdicts import FLAGS, NO_REASON, SENTENCES, Verdict
 
-# Decimals of a position, m, that are equal if two cells are at the same one.
+# Positions count as equal if they agree to this many decimals of a metre.
 DIGITS = 12
 
 
@@ -32,11 +32,11 @@ class OrientationWorkspaceMap(PlatformMap):
         """Find the robot's symmetries."""
         super().__init__(robot_file, spec, file)
         self._orientations = spec.orientations or Orientations()
-        # Limits may differ from cable to cable.
+        # Limits that differ from cable to cable break symmetries.
         self._alike = NONE if limits_set(self._problem.limits) else symmetries(self._problem.robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile; see `GridMap.__call__`. Positions that symmetries join are computed once."""
+        """Answers of the cells of a tile; symmetric positions are computed once; see `GridMap.__call__`."""
         positions, depths = self._targets(cells), self._depths(cells)
         radius, azimuth = np.hypot(positions[:, 0], positions[:, 1]), np.arctan2(positions[:, 1], positions[:, 0])
         azimuth = folded(self._alike, azimuth)
@@ -46,7 +46,7 @@ class OrientationWorkspaceMap(PlatformMap):
         return {name: values[inverse.ravel()] for name, values in answers.items()}
 
     def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # Return z0; where none is given, that of horizontal transitions. Accessible orientations do not need it.
+        # Return z0, if not given, that of horizontal transitions. Accessible orientations do not depend on it.
         depth = self._targets(cells)[:, 2]
         return np.asarray(cells.get("z0", depth), float)
 
@@ -80,14 +80,14 @@ class AttainabilityMap(OrientationWorkspaceMap):
     def _attainable(
         self, positions: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool
     ) -> PlatformMotionAnswers:
-        # Search for motions to orientations of (n, 3) angles at (n, 3) positions, both in the kernels' axes.
+        # Search for motions to orientations, (n, 3) angles, at (n, 3) positions, both in the kernels' axes.
         values, maximum = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
         arguments = self._checker, positions, angles, z0
         return attainable(*arguments, max_arcs=maximum, values=values, symmetry=self._alike, margins=margins)
 
     def _at_positions(self, positions: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(positions, k) for k in (1, 2))
-        # Compute all positions with both steps together, so that batches are full.
+        # Compute all positions with both steps in one call, so that batches are full.
         sets = [*fine, *coarse]
         counts = [len(inside.angles) for inside in sets]
         position_index = np.repeat(np.tile(np.arange(len(positions)), 2), counts)
@@ -115,7 +115,7 @@ class AttainabilityMap(OrientationWorkspaceMap):
         return super().contradictions(answers) | {"more orientations attainable than accessible": more}
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
-        """Number of positions of which some orientation stays undecided; see `GridMap.undecided`."""
+        """Number of positions with at least one undecided orientation; see `GridMap.undecided`."""
         return int((answers["undecided_fraction"] > 0.0).sum())
 
 
@@ -131,7 +131,7 @@ def _of_sets(fine: list[Accessible], coarse: list[Accessible]) -> dict[str, np.n
 
 
 def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> dict[str, float]:
-    # Summarise the orientations at one position; values are NaN where nothing is accessible.
+    # Summarise the orientations at one position; values are NaN where no orientation is accessible.
     count, good = len(arcs), arcs > 0
     if not count:
         names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)
@@ -149,7 +149,7 @@ def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> 
     }
 
 
-# These quantities have no value where nothing is accessible.
+# Quantities without a value where no orientation is accessible.
 FLOATS = tuple(name for name in MAP_KINDS["orientations"].quantities if QUANTITIES[name].kind == "float")
 
 
@@ -178,14 +178,14 @@ class OrientationsMap(AttainabilityMap):
         return results
 
     def _accessible(self, positions: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        # Tell which orientations are accessible, (n,); their angles are points of the grid of orientations.
+        # Tell which orientations are accessible, (n,); their angles are on the grid of orientations.
         divisions = self._orientations.divisions
         distinct, inverse = np.unique(np.round(positions, DIGITS), axis=0, return_inverse=True)
         index, inside = _index(angles, divisions), np.zeros(len(positions), bool)
         for k, position in enumerate(distinct):
             free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
             free[_index(accessible(self._problem.robot, position, "grid", divisions).angles, divisions)] = True
-            free[:, 0] = free[0, 0]  # without a tilt, its azimuth means nothing
+            free[:, 0] = free[0, 0]  # without a tilt, its azimuth has no meaning
             is_there = inverse.ravel() == k
             inside[is_there] = free[tuple(i[is_there] for i in index)]
         return inside

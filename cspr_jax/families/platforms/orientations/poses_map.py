@@ -58,8 +58,8 @@ class PosesMap(PlatformMap):
         return pose_arcs(self._checker, motions, fixed=arcs, **how)
 
     def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
-        # Return the columns among obstacles; motions are proved as those of a plan are.
-        # Maps without obstacles need no proofs of any motion.
+        # Return the columns of motions among obstacles, which are proved as those of a plan are. Import here: maps
+        # without obstacles need no general proof.
         from cspr_jax.verification.bounds.batch import MotionBatch
         from cspr_jax.verification.verifier import Verifier
 
@@ -77,7 +77,7 @@ class PosesMap(PlatformMap):
         return verifier.columns(join, len(motions.z0), max_arcs=self._keys.trajectory.max_arcs)
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
-        # Return the poses at the starts, and the values of beta-hat there.
+        # Return the poses at the starts, and the values of beta-hat at them.
         start, count = self._keys.trajectory.start, len(z0)
         if start is None or start.position is None:
             return rest_poses(z0), np.full(count, AT_REST)
@@ -92,8 +92,8 @@ class PosesMap(PlatformMap):
         return (position, rotated), beta_hats
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
-        if self._is_redundant:  # neither the side of the spools nor a singular reference matters
+        """Refuse targets that are all out of reach, and a robot that cannot rest; see `GridMap.refuse_hopeless`."""
+        if self._is_redundant:  # the side of the spools and a singular reference do not matter
             return
         super().refuse_hopeless(grid)
         errors = []

@@ -1,4 +1,4 @@
-"""Cables between samples: steps are halved until cables turn little within each."""
+"""Motions whose cables cross between samples: steps are halved until cables turn little within each step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import cables_cross, platform_hit
 
 HALVINGS = 12
-# Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.
+# A step is halved if the cosine of the angle by which a cable, or a vector between cables, turns is below this.
 MIN_COSINE = 0.8
 
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
@@ -23,7 +23,7 @@ def crossings(
     ends: tuple[Float[np.ndarray, "k"], Float[np.ndarray, "k"]],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and motions in whose steps a cable crosses the platform."""
+    """Tell in which motions cables cross within a step, and in which a cable crosses the platform."""
     met, hit = (np.zeros(count, bool) for _ in range(2))
     if not len(motion):
         return met, hit

@@ -1,12 +1,12 @@
 """Feasibility of motions of a platform on more than six cables, with margins: samples first, a proof at the end.
 
-Motion and limits leave a choice of tensions. The margin at a time is the margin of a workspace (`workspaces`) at
-the pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
-the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
-supply the wrench there is no s. Searches take samples, finer where it matters; what they choose is then proved, by
-tensions that balance the motion throughout blocks of time (`verification.proved_answers`), and so is that cables, thick
-ones too, do not touch each other. Contacts with the platform are checked where its attachment points lie in a plane, or
-a plan gives its shape.
+Motion and limits do not determine the tensions. The margin at a time is the margin of a workspace (`workspaces`) at
+the pose for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
+the wrench. Neither the determinant nor the platform's side of the spools matters: where the cables cannot supply the
+wrench, there is no s. Searches take samples, finer ones where necessary; the motion that they choose is then proved by
+tensions that balance it throughout blocks of time (`verification.proved_answers`), and so is that cables, even thick
+ones, do not touch each other. Contacts with the platform are checked if its attachment points lie in a plane, or if a
+plan gives its shape.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ from cspr_jax.workspaces.poses import exact
 from cspr_jax.workspaces.requirements import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-MAX_SAMPLES = 200_000  # samples that are held at a time
-CHUNK = 8  # samples of a motion that are screened at a time
-# Samples an arc.
+MAX_SAMPLES = 200_000  # number of samples in memory at a time
+CHUNK = 8  # number of samples of a motion screened at a time
+# Number of samples per arc.
 SAMPLES = 32
-# A search looks for minima between samples where a smallest sample is below this part of the largest.
+# A search refines minima between samples if the smallest sample is below this fraction of the largest.
 NEAR = 0.1
-HALVINGS = 60  # of an interval of beta-hat, down to rounding
-FLAT = 1e-12  # derivatives over margins that count as zero
-# An interval of no values.
+HALVINGS = 60  # bisections of an interval of beta-hat, down to rounding
+FLAT = 1e-12  # derivatives over margins count as zero below this
+# Empty interval.
 NONE = (LARGEST, -LARGEST)
 
 
 class MarginScreen:
-    """Cheap test of motions by the margins of their tensions, and other limits; see `Screen`."""
+    """Cheap test of motions by the margins of their tensions, and by other limits; see `Screen`."""
 
     def __init__(self, checker: "RedundantChecker") -> None:
-        """Keep the checker."""
+        """Store the checker."""
         self._checker = checker
 
     def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -60,7 +60,7 @@ class MarginScreen:
         return self._minima(segments, arcs, tau)[:, 0]
 
     def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
-        """Motions that some samples refute; see `Screen.refuted`."""
+        """Tell which motions some samples refute; see `Screen.refuted`."""
         is_refuted = np.zeros(len(segments.rate), bool)
         for start in range(0, len(tau), CHUNK):
             alive = np.flatnonzero(~is_refuted)
@@ -71,7 +71,7 @@ class MarginScreen:
         return is_refuted
 
     def _minima(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        # Return (n, n_slacks), the margin first, without the distances between cables.
+        # Return slacks (n, n_slacks), the margin first, without distances between cables.
         motions = Motions(segments, np.full(len(segments.rate), arcs))
         minimum = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
         return np.where(np.isnan(minimum), -np.inf, minimum)
@@ -81,7 +81,7 @@ class RedundantChecker(MotionChecker):
     """Checker of motions of one robot on more cables than six; see `MotionChecker`."""
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
-        """Find which cables can meet."""
+        """Find which cables can touch."""
         super().__init__(problem, kind, batch=batch)
         robot, limits = problem.robot, problem.limits
         self._limits = other_limits(limits)
@@ -98,7 +98,7 @@ class RedundantChecker(MotionChecker):
         self._knots = np.clip(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]), 0.0, 1.0)
 
     def values(self, motions: Motions, tau: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n m n_values"]:
-        """Margins, other slacks and distances along motions."""
+        """Margins, other slacks, and distances between cables along motions."""
         motion = np.repeat(np.arange(len(tau)), tau.shape[1])
         kernel = partial(samples_of, self.problem, self._pairs, kind=self.kind)
         states = in_batches(kernel, (*motions.items(motion), tau.ravel()), batch_size=self.batch)
@@ -115,8 +115,8 @@ class RedundantChecker(MotionChecker):
 
     def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
         """Value with the largest margin, and interval of positive margins; see `MotionChecker.end_interval`."""
-        # The wrench is linear in beta-hat, and so is its distance from each plane; the margin, the smallest distance,
-        # is concave.
+        # The wrench is linear in beta-hat, and so is its distance from each plane; the margin is the smallest distance,
+        # so it is concave.
         matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
         unit = self._workspace.unit
         planes = exact.margin_planes(matrix / unit[:, None], self._requirement.low, self._requirement.high)
@@ -142,7 +142,7 @@ class RedundantChecker(MotionChecker):
         self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Values of beta-hat to try at poses, that of the largest margin first; see `MotionChecker.end_options`."""
-        # It is kept where no value is feasible, so that its motion shows what fails.
+        # If no value is feasible, keep the one of largest margin: its motion shows what fails.
         poses = zip(positions, quaternions, z0.tolist(), strict=True)
         ends = np.array([self.end_interval(*pose) for pose in poses]).reshape(-1, 3)
         values = options(ends[:, 0], ends[:, 1], ends[:, 2], count)
@@ -150,7 +150,7 @@ class RedundantChecker(MotionChecker):
         return values, np.ones(len(ends), bool)
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
-        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        """Mask of the criteria that are certainly broken; see `MotionChecker.breaks`."""
         return slack <= -SAMPLES_UNDECIDED
 
     def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -167,11 +167,11 @@ class RedundantChecker(MotionChecker):
         margins: bool = True,
         ignored: np.ndarray | None = None,
     ) -> PlatformChecks:
-        """Check motions by samples: nothing is proved yet; see `MotionChecker.check`."""
+        """Check motions by samples, without a proof; see `MotionChecker.check`."""
         return self._at_samples(Motions(segments, arcs), full, ignored)
 
     def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
-        """Checks of motions that passed, with a proof of each; see `MotionChecker.confirmed`."""
+        """Checks of motions that passed, each with a proof; see `MotionChecker.confirmed`."""
         motions = Motions(segments, arcs)
         checks = self._at_samples(motions, True, None)
         for i in np.flatnonzero(checks.verdict == 0).tolist():
@@ -222,7 +222,7 @@ class RedundantChecker(MotionChecker):
     def _smallest(
         self, motions: Motions, tau: np.ndarray, samples: np.ndarray, full: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        # Return smallest values (n, n_values), and their times.
+        # Return smallest values (n, n_values) and their times.
         minimum, when = samples.min(1), tau[samples.argmin(1)]
         is_near = np.logical_or(full, ~(minimum > NEAR * np.abs(samples).max(1)).all(1))
         if is_near.any():
@@ -254,7 +254,7 @@ class RedundantChecker(MotionChecker):
         verdict |= np.where(is_short, Verdict.WRENCH_INFEASIBLE.value, 0)
         for limit, value, counts in zip(self._limits, others.T, counted, strict=True):
             verdict |= np.where(counts & (value <= -SAMPLES_UNDECIDED), limit.flag.value, 0)
-        # Limits that are nearly touched are for the proof of the motion.
+        # Leave limits that are nearly touched to the proof.
         is_strict = float(np.min(self._requirement.low)) == 0.0
         verdict |= np.where(is_strict & (np.abs(margin) <= SAMPLES_UNDECIDED), Verdict.UNDECIDED.value, 0)
         verdict = conjunction(verdict)
@@ -268,15 +268,15 @@ class RedundantChecker(MotionChecker):
 
 
 def _refuted_at(minima: np.ndarray, when: np.ndarray) -> np.ndarray:
-    # Take smallest values (n, n_values), the margin first, and the times at which they are attained. Return the
-    # time of the margin if it is negative, else of the worst other value if that is negative, else NaN.
+    # Take smallest values (n, n_values), the margin first, and their times. Return the time of the margin if it is
+    # negative, else that of the worst other value if that is negative, else NaN.
     worst = np.where(minima[:, 0] <= -SAMPLES_UNDECIDED, 0, minima.argmin(1))
     index = np.arange(len(minima))
     return np.where(minima[index, worst] <= -SAMPLES_UNDECIDED, when[index, worst], np.nan)
 
 
 def _in_order(values: np.ndarray) -> np.ndarray:
-    # Take the margin, slacks of other limits and the distance; return slacks in the order of the flags (n, n_criteria):
-    # NaN for the determinant, which does not exist, and infinity for the depth below the spools, which does not matter.
+    # Convert margin, slacks of other limits and distance to slacks in the order of the flags, (n, n_criteria): NaN for
+    # the determinant, which does not exist, and infinity for the depth below the spools, which does not matter.
     nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
     return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

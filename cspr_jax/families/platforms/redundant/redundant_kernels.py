@@ -25,8 +25,8 @@ class PoseSamples(NamedTuple):
     Fields:
         position: (n, 3) m.
         quaternion: (n, 4).
-        wrench: (n, 6) what the cables must supply, N and N m.
-        slacks: (n, n_rows) slacks of limits other than tension limits, and the smallest distance between cables, m.
+        wrench: (n, 6) wrench that the cables must supply, N and N m.
+        slacks: (n, n_rows) slacks of limits other than those of tensions, and the smallest distance between cables, m.
     """
 
     position: Array
@@ -43,7 +43,7 @@ def samples_of(
     *,
     kind: PlatformMotionKind,
 ) -> PoseSamples:
-    """Poses, wrenches and slacks of motions, each at one time."""
+    """Poses, wrenches and slacks of motions, at one time each."""
     robot, limits = problem.robot, problem.limits
 
     def one(segment, arcs, tau):
@@ -65,7 +65,7 @@ def cable_vectors(
     *,
     kind: PlatformMotionKind,
 ) -> tuple[Float[Array, "n n_pairs 3"], Float[Array, "n n_cables 3"]]:
-    """Vectors between cables, and directions of cables, of motions, each at one time."""
+    """Vectors between cables, and directions of cables, of motions at one time each."""
 
     def one(segment, arcs, tau):
         state = PlatformMotion(segment, problem.amplitude, arcs, kind).state(tau)
@@ -79,6 +79,6 @@ def cable_vectors(
 def end_wrenches(
     robot: PlatformRobot, position: Float[Array, "3"], quaternion: Float[Array, "4"], z0: Float[Array, ""]
 ) -> tuple[Float[Array, "6 n_cables"], Float[Array, "2 6"]]:
-    """Wrenches at one end of a segment."""
+    """Wrenches at one end of a segment, by beta-hat."""
     states = [end_state(robot, position, quaternion, z0, jnp.asarray(value)) for value in (0.0, 1.0)]
     return robot.wrench_matrix(states[0]), jnp.stack([robot.inertial_wrench(state) for state in states])

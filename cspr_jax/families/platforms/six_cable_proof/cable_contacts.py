@@ -1,11 +1,11 @@
-"""Proofs that cables meet each other, or lie on the platform, in a step between two times.
+"""Proofs that cables touch each other, or the platform, within a step between two times.
 
-Two cables from a and b along u and v lie in one plane where F = (b - a) . (u x v) vanishes. If F changes its sign in a
-step, and the lines' nearest points stay inside both cables all the while, the cables meet in between. A cable is on the
-platform where its height over the platform's plane vanishes while it points into its corner's sector.
+Two cables from a and b along u and v lie in one plane if F = (b - a) . (u x v) vanishes. If F changes sign in a step
+while the nearest points of the lines stay inside both cables, the cables touch within the step. A cable touches the
+platform if its height over the platform's plane vanishes while it points into the sector of its corner.
 
 A vector r with |r''| <= C stays within |r1 - r0| / 2 + C h^2 / 8 of the mean of its values at both ends of a step of
-length h; so what holds for all vectors within that distance holds during the step. Steps in which no sign changes are
+length h; so what holds for all vectors within this distance holds during the step. Steps without a change of sign are
 skipped.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float, Int
 
-# Rounding may move F, or a height, by this part of the product of the norms of its factors.
+# Rounding may change F, or a height, by this fraction of the product of the norms of its factors.
 PRODUCT_ERROR = 1e-13
 
 
@@ -27,8 +27,8 @@ class CablesOfStep(NamedTuple):
     Fields:
         rays: (m, n, n_cables, 3) from spool to platform, m.
         platform_rays: (m, n, n_cables, 3) from platform to spool in the axes of the platform, m.
-        deviation: (n, n_cables) C h^2 / 8 of `rays`, m.
-        platform_deviation: (n,) C h^2 / 8 of `platform_rays`, m.
+        deviation: (n, n_cables) bound C h^2 / 8 for `rays`, m.
+        platform_deviation: (n,) bound C h^2 / 8 for `platform_rays`, m.
     """
 
     rays: np.ndarray
@@ -57,7 +57,7 @@ class _Balls(NamedTuple):
 def cables_meet(
     base: Float[np.ndarray, "n_cables 3"], pairs: Float[np.ndarray, "n_pairs 2"], cables: CablesOfStep
 ) -> Int[np.ndarray, "n"]:
-    """Steps in which two cables meet for certain."""
+    """Steps in which two cables certainly touch."""
     meets = np.full(cables.rays.shape[1], -1)
     i, j = pairs.T
     spools = base[j] - base[i]
@@ -71,7 +71,7 @@ def cables_meet(
     minimum = normal.dot(normal)[0]
     inside = minimum > 0.0
     for other in (second, first):
-        # Bound the fraction of a cable at which the lines are nearest, times the square of the normal.
+        # Bound the fraction of a cable at which the lines are nearest, times the squared norm of the normal.
         low, high = between.cross(other).dot(normal)
         inside &= (low > 0.0) & (high < minimum)
     meets[block[inside]] = step[inside]
@@ -81,13 +81,13 @@ def cables_meet(
 def cables_hit(
     sides: Float[np.ndarray, "n_cables 2 3"], normal: Float[np.ndarray, "3"], cables: CablesOfStep
 ) -> Int[np.ndarray, "n"]:
-    """Steps in which a cable lies on the platform for certain."""
+    """Steps in which a cable certainly touches the platform."""
     hits = np.full(cables.platform_rays.shape[1], -1)
     step, block, cable = _sign_changes(cables.platform_rays @ normal, _norm(cables.platform_rays).max(0))
     deviation = np.broadcast_to(cables.platform_deviation[:, None], cables.platform_rays.shape[1:3])
     rays = _within(cables.platform_rays, (step, block, cable), deviation)
     one, two = sides[cable, 0], sides[cable, 1]
-    # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
+    # If a vector moves, the area between it and a side changes by at most the side's length times the displacement.
     inside = np.cross(two, rays.center) @ normal > _norm(two) * rays.radius
     inside &= np.cross(rays.center, one) @ normal > _norm(one) * rays.radius
     inside |= (sides[cable] == 0.0).all((1, 2))  # the sector is all of the plane
@@ -96,13 +96,13 @@ def cables_hit(
 
 
 def _sign_changes(values: np.ndarray, magnitudes: np.ndarray) -> tuple[np.ndarray, ...]:
-    # Return the steps, blocks and pairs (or cables) in which values (m, n, ...) change their sign, beyond rounding.
+    # Return the steps, blocks and pairs (or cables) in which values (m, n, ...) change sign beyond rounding.
     is_high, is_low = values > PRODUCT_ERROR * magnitudes, values < -PRODUCT_ERROR * magnitudes
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
 def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], deviation: np.ndarray) -> _Balls:
-    # Enclose vectors during the steps that begin at the given times.
+    # Enclose vectors during the steps that start at given times.
     step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
     return _Balls(0.5 * (before + after), 0.5 * _norm(after - before) + deviation[block, cable])

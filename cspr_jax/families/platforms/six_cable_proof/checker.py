@@ -1,8 +1,8 @@
-"""Feasibility of a platform's motions: proved on blocks of time, or refuted by a sample; and margins.
+"""Feasibility of a platform's motions, proved on blocks of time or refuted by a sample, and their margins.
 
-A screen at a few samples refutes most infeasible motions. Tensions, the determinant and the limits on the motion
-are then proved by `tension_proof`, contacts and the limits on the pose by `pose_proof`. Margins are the smallest values
-that are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
+A screen with a few samples refutes most infeasible motions. Then `tension_proof` proves tensions, the determinant and
+limits on the motion, and `pose_proof` proves contacts and limits on the pose. Margins are the smallest attained values,
+refined around the smallest samples of each criterion; proved bounds are given beside them.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
-BLOCKS = 1024  # in a call, at most
-ARCS = 32 * MANY  # of motions that are held at a time, at most
-# Samples that are computed together.
+BLOCKS = 1024  # largest number of blocks in a call
+ARCS = 32 * MANY  # largest number of arcs of motions in memory at a time
+# Number of samples computed at a time.
 SAMPLES = 1 << 18
-# With margins, the bound must be at least this fraction of the attained value.
+# If margins are wanted, bounds must be at least this fraction of the attained values.
 NEAR = 0.5
 
 
-# XLA compiles one function here instead of some hundred small ones.
+# Compile one function instead of some hundred small ones.
 _end = jax.jit(endpoint)
 
 
@@ -68,7 +68,7 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
     ]
     squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
-    # Return a tuple: XLA would compute a whole stack for each of its elements.
+    # Return a tuple: XLA would compute the full stack for each of its elements.
     return *(slacks[k] for k in order(problem.limits)), nearest
 
 
@@ -76,13 +76,13 @@ class PlatformChecker(MotionChecker):
     """Checker of motions of one robot on six cables.
 
     Args:
-        problem: robot, limits, amplitude.
-        batch: how many motions are computed at a time.
+        problem: robot, limits and amplitude function.
+        batch: number of motions computed at a time.
 
     Fields:
         screen: the cheap test that comes before checks.
-        done: numbers of samples that were computed so far in the screen ("screen") and in checks ("checks"), and of
-            motions that were checked ("motions").
+        done: numbers of samples computed so far in the screen ("screen") and in checks ("checks"), and of checked
+            motions ("motions").
     """
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
@@ -102,7 +102,7 @@ class PlatformChecker(MotionChecker):
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         basic, missed = flags(Limits()), [_missed(problem, row) for row in limits_set(problem.limits)]
         self._missed = np.array([SIX_CABLES_UNDECIDED] * len(basic) + missed)
-        # Index of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
+        # Index of each criterion in a list with criteria of the motion first, then those of the pose.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
 
@@ -122,7 +122,7 @@ class PlatformChecker(MotionChecker):
         return end_options(self.problem.robot, positions, quaternions, z0, count)
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
-        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        """Mask of the criteria that are certainly broken; see `MotionChecker.breaks`."""
         return slack < -self._missed
 
     def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -191,7 +191,7 @@ class PlatformChecker(MotionChecker):
         return checks
 
     def _compile(self, motions: Motions, *, margins: bool) -> None:
-        # Compile both proofs at once, before the first check: XLA takes seconds for each, on one core. Other threads
+        # Compile both proofs at once before the first check: XLA takes seconds for each, on one core. Other threads
         # wait.
         with self._compiling:
             if margins not in self._compiled:
@@ -200,7 +200,7 @@ class PlatformChecker(MotionChecker):
                 self._compiled.add(margins)
 
     def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
-        """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
+        """Multiples of the uncertainty that motions tolerate; see `MotionChecker.tolerated`."""
         if self._robustness is None:
             return super().tolerated(segments, arcs)
         return self._robustness.tolerated(segments, arcs)
@@ -220,7 +220,7 @@ class PlatformChecker(MotionChecker):
     def _verdict(
         self, minimum: np.ndarray, is_proved: np.ndarray, poses: PoseProof, ignored: np.ndarray | None
     ) -> np.ndarray:
-        # If a criterion is broken for certain, the verdict says only that.
+        # If a criterion is certainly broken, the verdict names only such criteria.
         verdict = Verdict.CABLE_CABLE.value * poses.met | Verdict.CABLE_PLATFORM.value * poses.hit
         broken = self.breaks(minimum.T) & (True if ignored is None else ~ignored)
         for flag, column in zip(self.flags, broken.T, strict=True):
@@ -228,20 +228,20 @@ class PlatformChecker(MotionChecker):
         return np.where(is_proved, 0, np.where(verdict == 0, Verdict.UNDECIDED.value, verdict))
 
     def _attained(self, moving: np.ndarray, static: np.ndarray) -> np.ndarray:
-        # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the
-        # determinant second among the criteria that depend on the motion.
+        # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. In proofs the
+        # determinant is the second of the criteria that depend on the motion.
         columns = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], static[:, :-1]], axis=1)
         return np.concatenate([columns[:, self._order], static[:, -1:]], axis=1).T
 
     def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
-        # Find the indices of the values of both proofs among the criteria, the distance between cables last. The
-        # determinant stands second among the criteria that depend on the motion, and first after these among all.
+        # Find the indices of the values of both proofs among the criteria, with the distance between cables last. The
+        # determinant is second among the criteria that depend on the motion, and the first one after them among all.
         indices = np.argsort(self._order)
         moving = indices[[0, self._n_moving, *range(1, self._n_moving)]]
         return moving, np.append(indices[self._n_moving + 1 :], len(self.flags))
 
     def _narrow(self, minima: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
-        # Lower the attained values, (n_criteria + 1, n), of the selected motions to their margins.
+        # Lower the attained values, (n_criteria + 1, n), of selected motions to their margins.
         def values_at(index: np.ndarray, tau: np.ndarray) -> np.ndarray:
             kernel = partial(slacks_at, self.problem, pairs=self._poses.pairs, kind=self.kind)
             return np.stack(in_batches(kernel, (*motions.items(index), tau), batch_size=self.batch))
@@ -261,7 +261,7 @@ class PlatformChecker(MotionChecker):
 
 
 def _missed(problem: Problem, limit_row: Limit) -> float:
-    # Slack below which a limit counts as broken; that of a depth is over z0, at least a tenth of the spool radius.
+    # Return the slack below which a limit counts as broken; a depth is over z0, at least a tenth of the spool radius.
     robot, limit = problem.robot, float(np.min(getattr(problem.limits, limit_row.name)))
     units = scales(CABLES, robot.mass * robot.gravity, 0.1 * spool_radius(robot))
     factor, unit = units.get(limit_row.quantity, (1.0, limit))
@@ -269,10 +269,10 @@ def _missed(problem: Problem, limit_row: Limit) -> float:
 
 
 def _samples(criteria: np.ndarray, proof: TensionProof | PoseProof, motions: np.ndarray) -> Samples:
-    # Take samples of the motions in `rows` at the times of their first blocks; motions are numbered within `rows`.
+    # Take samples of the motions in `rows` at the times of their first blocks; motions are indexed within `rows`.
     numbers = np.full(len(proof.is_proved), -1)
     numbers[motions] = np.arange(len(motions))
     motion = numbers[proof.motion]
-    # A mask as an index would leave blocks as the slowest axis in memory.
+    # Indexing with a mask would make blocks the slowest axis in memory.
     motion, tau, nodes = (np.compress(motion >= 0, x, axis=-1) for x in (motion, proof.first.tau, proof.first.nodes))
     return Samples(criteria, motion, tau, nodes)

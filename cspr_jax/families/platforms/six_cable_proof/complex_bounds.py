@@ -1,13 +1,13 @@
 """Bounds of a platform's motion on an ellipse of complex time, one lane a block.
 
 A motion is analytic between the knots of its amplitude function. Around the middle m of a block, on the ellipse with
-the semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
+semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
 terms, sines and cosines by their values in the middle, and rotations by the imaginary part of half their rotation
-vector, v = beta u: for a complex v
+vector v = beta u. For a complex v
 
     |exp(2 [v])| <= exp(2 |Im v|) = G,    omega = 2 beta' u + 2 beta (integral over s from 0 to 1 of exp(2 s [v]) u')
 
-since a rotation leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
+since a rotation does not change its own axis. With b = 0 these are bounds on an interval of real time: docs/theory.md.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import polynomial, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
-FARTHEST = 1.9  # largest 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2
-NEAREST = 0.1  # smaller values of 1 - s count as this one
+FARTHEST = 1.9  # largest 1 - s for which arccos(s) / sqrt(1 - s^2) is bounded; 2 is singular
+NEAREST = 0.1  # smaller values of 1 - s are replaced by this
 
 
 class Middle(NamedTuple):
@@ -35,7 +35,7 @@ class Middle(NamedTuple):
 
     Fields:
         tau: (n,) normalised time.
-        terms: Taylor coefficients of A there, of the polynomial piece that holds it; (n,) each.
+        terms: Taylor coefficients of A in the middle, of the polynomial piece there; (n,) each.
     """
 
     tau: Array
@@ -69,7 +69,7 @@ def middle_of(amplitude: Amplitude, tau: Float[Array, "n"]) -> Middle:
 
 
 def phase_beside(middle: Middle, sense: Float[Array, "n"], arcs: Num[Array, "n"], off: Float[Array, "n"]) -> PhaseLanes:
-    """Phase beside the middle of a block, by the polynomial piece of the middle."""
+    """Phase at a time beside the middle of a block, by the polynomial piece of the middle."""
     tau, terms = middle.tau + off, middle.terms
     a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
     return PhaseLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
@@ -104,7 +104,7 @@ def ellipse_bounds(
     beta, beta1, beta2, beta_aside = betas
     v1 = beta1 * u + beta * u1
     grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
-    beside = 1.0 if kind.from_rest else grown  # from rest, all rotation is about one axis
+    beside = 1.0 if kind.from_rest else grown  # from rest, the rotation is about one axis
     omega = beta1 * u + beside * beta * u1
     angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
     if not kind.from_rest:
@@ -113,7 +113,7 @@ def ellipse_bounds(
 
 
 def _polynomial_bounds(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
-    # Bound |A|, |A'|, |A''| and |A'''|.
+    # Return bounds of |A|, |A'|, |A''| and |A'''|.
     values = [jnp.abs(term) for term in terms]
     return tuple(polynomial([math.perm(i, j) * values[i] for i in range(j, len(values))], along) for j in range(4))
 
@@ -134,8 +134,8 @@ class _RotationLaw(NamedTuple):
 
 
 def _trigonometric(middle: tuple[Array, Array], along: Array, expansion: Array) -> _Trigonometric:
-    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; `expansion` is exp of the
-    # largest imaginary part.
+    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; `expansion` is the
+    # exponential of the largest imaginary part.
     shrunk = 1.0 / expansion
     cosh, sinh = 0.5 * (expansion + shrunk), 0.5 * (expansion - shrunk)
     near = jnp.minimum(along, 1.0)
@@ -151,8 +151,8 @@ def _trigonometric(middle: tuple[Array, Array], along: Array, expansion: Array) 
 def _swing(
     segment: PlatformSegment, arcs: Array, middle: Middle, axes, bounds, first, kind: PlatformMotionKind
 ) -> tuple[Array, Array]:
-    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the norm of the frame that turns with the
-    # ellipse.
+    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the norm of the frame that precesses with
+    # the ellipse.
     omega = math.pi * arcs
     sine, cosine, _ = first
     if kind.from_rest:
@@ -198,7 +198,7 @@ def _rotation_law(segment: PlatformSegment, arcs: Array, middle: Middle, axes, f
 
 
 def _half_vector(segment: PlatformSegment, middle: Middle, axes, bounds, angle: Array) -> tuple[Array, ...]:
-    # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
+    # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope at the angle phi = Theta A.
     slerp = segment.slerp
     rate, second_derivative = angle * bounds[1], angle * bounds[2]
     grown = jnp.exp(axes[1] * rate)
@@ -216,8 +216,8 @@ def _half_vector(segment: PlatformSegment, middle: Middle, axes, bounds, angle: 
 
 
 def _angle_ratio(off: Array) -> tuple[Array, ...]:
-    # Bound W = arccos(s) / sqrt(1 - s^2) and its derivatives where |1 - s| <= off: their series in 1 - s
-    # have positive terms alone, so that they are largest on the real axis.
+    # Bound W = arccos(s) / sqrt(1 - s^2) and its derivatives where |1 - s| <= off: their series in 1 - s have only
+    # positive terms, so they are largest on the real axis.
     is_inside = off < FARTHEST
     s = 1.0 - jnp.where(is_inside, off, 1.0)
     square = 1.0 - s * s

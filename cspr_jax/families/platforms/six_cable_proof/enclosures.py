@@ -1,4 +1,4 @@
-"""Enclosures of a moving platform, for bounds over robots that differ a little; vectors are in platform axes."""
+"""Enclosures of a platform's motion, for bounds over slightly different robots; vectors are in platform axes."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates,
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
-# Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
+# Nearest points count as between the ends of cables, and cables as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6
-# Number of blocks of an arc to begin with; larger blocks are hardly ever enough.
+# Number of blocks of an arc at first; larger blocks are hardly ever enough.
 PARTS = 32
 # Radius of the discs in complex time on which changes of accelerations are bounded, over the time in which the phase of
 # the oscillation changes by 1 rad.
@@ -48,7 +48,7 @@ RADIUS = 0.4
 
 
 class _Moving(NamedTuple):
-    # State in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
+    # States in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
     # about all of their times (`wide`).
     state: StateLanes
     squared: Array
@@ -70,8 +70,9 @@ def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) ->
 
 @partial(jax.jit, static_argnames="pairs")
 def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Array, Array, Array]:
-    # Return the fractions of their lengths at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors
-    # (n, n_pairs, 3), and the residuals of the projections of cables onto the sectors of their corners (n, 6, 3).
+    # Return the fractions of cable lengths at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors
+    # between them (n, n_pairs, 3), and the residuals of projections of cables onto the sectors of their corners (n, 6,
+    # 3).
     sides, normal = platform
     one, two = ([sides[:, side, k] for k in range(3)] for side in range(2))
     left = jax.vmap(lambda ray: jnp.stack(residual((one, two), normal, -ray.T), axis=1))(rays)
@@ -83,9 +84,9 @@ def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Ar
 
 
 class _Middle(NamedTuple):
-    # Values in the middles of k blocks, in platform axes and time: rays, their rates as the platform sees them,
-    # velocity and acceleration of the attachment points (k, 6, 3); force and moment (k, 3) per
-    # mass, acceleration matrix (k, 3, 3).
+    # Values in the middles of k blocks, in platform axes and time: rays, their rates in platform axes, velocity and
+    # acceleration of the attachment points (k, 6, 3); force and moment per mass (k, 3), acceleration matrix
+    # (k, 3, 3).
     rays: np.ndarray
     ray_rate: np.ndarray
     velocity: np.ndarray
@@ -96,7 +97,7 @@ class _Middle(NamedTuple):
 
 
 class _Within(NamedTuple):
-    # Changes of the rays along their tangents up to the ends of k blocks (k, 6, 3), and bounds of changes within these
+    # Changes of rays along their tangents up to the ends of k blocks (k, 6, 3), and bounds of changes within these
     # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
     # force and acceleration matrix (k,).
     tangent: np.ndarray
@@ -145,7 +146,7 @@ def _skew(vectors: np.ndarray) -> np.ndarray:
 
 
 def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.ndarray, arcs: np.ndarray) -> _Within:
-    # Bound changes in real time by `near`; where a derivative has no bound, by Cauchy's inequality from values on
+    # Bound changes in real time by `near`; where a derivative has no bound, use Cauchy's inequality and values on
     # discs.
     near, wide, squared = (
         *(EllipseBounds(*(x[:, None] for x in y)) for y in (moving.near, moving.wide)),
@@ -174,7 +175,7 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
 
 
 class _Columns:
-    # Columns of `Distances`, which are added one by one.
+    # Columns of `Distances`, appended one by one.
 
     def __init__(self, count: int) -> None:
         self._count, self._columns = count, list[tuple]()
@@ -207,7 +208,7 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
 
 
 def _add_gap(columns: _Columns, gaps, fractions, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
-    # Add the distance of two cables, by the four pairs of their ends: seen from the platform only the spools move.
+    # Add the distance of two cables from the four pairs of their ends; in platform axes only the spools move.
     i, j = pair
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
     tilt = _tilted(middle.rays[:, i], middle.rays[:, j], fractions)
@@ -224,8 +225,8 @@ def _add_gap(columns: _Columns, gaps, fractions, middle: _Middle, within: _Withi
 
 
 def _tilted(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-    # Return vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are
-    # nearest between their ends; there both cables are normal to the shortest vector.
+    # Return vectors that grow by 1 along each cable towards its spool, as displacements do, at the nearest points
+    # between the ends of the cables; there both cables are normal to the shortest vector.
     directions = np.stack([first, -last], axis=1)
     inner = (fractions > INSIDE) & (fractions < 1.0 - INSIDE)
     gram = (
@@ -240,18 +241,18 @@ def _tilted(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) -> np.nd
 
 
 class Robustness:
-    """Multiples of an uncertainty that motions of one robot on six cables stand.
+    """Multiples of an uncertainty that motions of one robot on six cables tolerate.
 
     Args:
-        problem: robot, limits with an uncertainty, amplitude.
-        batch: how many blocks are computed at a time.
-        count_samples: called with the number of samples that were computed.
+        problem: robot, limits with an uncertainty, and amplitude function.
+        batch: number of blocks computed at a time.
+        count_samples: called with the number of computed samples.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
-        """Find which cables can meet each other or the platform."""
+        """Find which cables can touch each other or the platform."""
         self._problem, self._kind, self._batch = problem, kind, batch
         near = contacts(problem.robot)
         self._pairs = tuple((int(i), int(j)) for i, j in near.pairs)
@@ -260,7 +261,7 @@ class Robustness:
         self._knots = np.asarray(problem.amplitude.knots)
 
     def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, full: bool = True) -> Tolerated:
-        """Multiples that motions stand."""
+        """Multiples that motions tolerate."""
         blocks = parts_of_arcs(arcs, self._knots, PARTS)
         requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
         return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), full=full)

@@ -1,4 +1,4 @@
-"""Limits on a platform's motion as analytic functions on blocks, one row a quantity.
+"""Limits on a platform's motion as analytic functions on blocks, one row for each quantity.
 
     tension         |x_k| kappa_k / z0 over D, compared with the limit over the weight that a cable carries
     speed           (|x_k|^2 - (x_k . x_k')^2 / limit^2) / z0^2
@@ -6,7 +6,7 @@
 
     mass centre     1 - |p'|^2 / limit^2,   1 - |p''|^2 / limit^2
 
-with x_k cable k as a vector and primes for derivatives in time. All but the first are positive exactly while the limit
+with x_k the vector of cable k, and primes for derivatives in time. All but the first are positive exactly if the limit
 is met.
 """
 
@@ -23,17 +23,17 @@ from cspr_jax.numerics.linear.lanes import dot
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_lanes import CABLES, CableLanes, cable_rates
 
-# The length of a ray is analytic where the ray changes by less than this part of it: sqrt(2) - 1.
+# The length of a ray is analytic if the ray changes by less than this fraction of it: sqrt(2) - 1.
 STRAIGHT = 0.414
 Pair = tuple[Array, Array]
 
 
 class Node(NamedTuple):
-    """One node of each of n blocks.
+    """One node in each of n blocks.
 
     Fields:
-        state: of the platform.
-        cables: arms and rays.
+        state: state of the platform.
+        cables: vectors of the cables.
         kappa: numerators of the slacks of taut cables, (n,) each; see `tension_blocks`.
         squared: T^2, s^2.
         z0: depth of P0, m.
@@ -47,18 +47,18 @@ class Node(NamedTuple):
 
 
 class CableEllipseBounds(NamedTuple):
-    """Bounds on an ellipse of complex time, one (n,) a cable.
+    """Bounds on an ellipse of complex time, one (n,) for each cable.
 
     Fields:
         kappa: bounds of the numerators of the slacks of taut cables.
-        rays: bounds of lengths, m.
+        rays: bounds of the lengths of rays, m.
         ray_rates: bounds of the derivative of rays in normalised time, m.
         ray_accelerations: bounds of the second derivative of rays, m.
-        is_straight: whether lengths are analytic.
+        is_straight: whether the lengths are analytic.
         squared: (n,) T^2, s^2.
         z0: (n,) depth of P0, m.
         speed: (n,) bound of |p'| of the mass centre in normalised time, m.
-        second_derivative: (n,) likewise of |p''|.
+        second_derivative: (n,) bound of |p''| of the mass centre in normalised time, m.
     """
 
     kappa: Sequence[Array]
@@ -73,13 +73,13 @@ class CableEllipseBounds(NamedTuple):
 
 
 class Enclosed(NamedTuple):
-    """Lower and upper bounds of a quantity on n blocks and at their nodes, (m, n_cables, n); of D (m, 1, n).
+    """Lower and upper bounds of a quantity on n blocks and at their nodes, (m, n_cables, n); those of D are (m, 1, n).
 
     Fields:
-        coefficients: bounds of Bernstein coefficients, which allow for what the polynomials leave out.
-        nodes: bounds of the values at the nodes, which allow for rounding.
-        regular: as `coefficients`, of D.
-        fraction: as `nodes`, of D.
+        coefficients: bounds of Bernstein coefficients, widened by the remainders of the polynomials.
+        nodes: bounds of the values at the nodes, widened by rounding.
+        regular: bounds for D, as `coefficients`.
+        fraction: bounds for D, as `nodes`.
     """
 
     coefficients: Pair
@@ -89,14 +89,14 @@ class Enclosed(NamedTuple):
 
 
 class LimitOnBlocks(NamedTuple):
-    """A quantity of the motion that limits bound.
+    """A limited quantity of the motion.
 
     Fields:
-        width: number of values that stand for the quantity.
-        values: takes a node and the limit (n_cables,); gives the values in pairs of (n,).
-        bounds: takes `CableEllipseBounds` and the limit; gives a bound of the magnitude of each value.
-        slacks: takes the enclosed values, the limit over the scale of slacks, and whether the limit is a lower one;
-            gives upper bounds of the smallest slacks at the nodes (m, n), and a lower bound of all slacks (n,).
+        width: number of values that represent the quantity.
+        values: function of a node and the limit (n_cables,); gives the values in pairs of (n,).
+        bounds: function of `CableEllipseBounds` and the limit; gives a bound of the magnitude of each value.
+        slacks: function of the enclosed values, the limit over the scale of slacks, and whether the limit is a lower
+            one; gives upper bounds of the smallest slacks at the nodes (m, n), and a lower bound of all slacks (n,).
     """
 
     width: int
@@ -106,14 +106,14 @@ class LimitOnBlocks(NamedTuple):
 
 
 def ratio(top: Float[Array, "..."], regular: Pair) -> Float[Array, "..."]:
-    """Lower bounds of quotients of polynomials: the smallest one that their coefficients allow."""
+    """Lower bounds of quotients of polynomials: the smallest quotient that their coefficients allow."""
     low, high = regular
     bottom = jnp.where(top > 0.0, high, low)
     return jnp.where(bottom > 0.0, top / jnp.where(bottom > 0.0, bottom, 1.0), -jnp.inf)
 
 
 def at_most(top: Float[Array, "..."], regular: Pair) -> Float[Array, "..."]:
-    """Upper bounds of quotients where the denominator is positive."""
+    """Upper bounds of quotients with a positive denominator."""
     return -ratio(-top, regular)
 
 
@@ -166,7 +166,7 @@ def _speed_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
 
 
 def _of_mass_centre(vector, largest: Array) -> list[Pair]:
-    # Values come in pairs.
+    # Values must come in pairs.
     value = 1.0 - dot(vector, vector) / largest**2
     return [(value, value)]
 
@@ -196,12 +196,12 @@ def _acceleration_bounds(cable: CableEllipseBounds, limit: Array) -> list[Array]
 def _acceleration_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
     (low, high), (under, over) = enclosed.coefficients, enclosed.nodes
     worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
-    # Take accelerations as near to zero as rounding lets them be.
+    # Take accelerations as close to zero as rounding allows.
     accelerations = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
     return jnp.min(over[:, ::2] - accelerations, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
 
 
-# The keys are the names of the quantities in the rows of `schema.limits`.
+# Keys are the names of quantities in the rows of `schema.limits`.
 QUANTITIES = {
     "tension": LimitOnBlocks(CABLES, _tensions, _tension_bounds, _tension_slacks),
     "speed": LimitOnBlocks(CABLES, _speeds, _speed_bounds, _speed_slacks),

@@ -1,4 +1,4 @@
-"""Margins of a platform's motions: smallest values that are attained, narrowed down from samples by parabolas."""
+"""Margins of a platform's motions: smallest attained values, refined from samples by parabolas."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Bool, Float, Int
 
-ROUNDS = 5  # parabolas, one after the other
-NEARER = 3.0  # ratio of the distances of the points of one and of the next
-LEVEL = 1e-9  # spread of values below which they are not narrowed down
+ROUNDS = 5  # number of parabolas, each within the previous one
+NEARER = 3.0  # ratio of the point distances of one parabola and the next
+LEVEL = 1e-9  # values with a smaller spread are not refined
 
 
 class Samples(NamedTuple):
     """Samples of criteria along motions.
 
     Fields:
-        criteria: (n_values,) their numbers.
+        criteria: (n_values,) indices of the criteria.
         motion: (k,) motion of each block.
         tau: (m, k) times, increasing.
-        values: (m, n_values, k).
+        values: (m, n_values, k) values of the criteria.
     """
 
     criteria: np.ndarray
@@ -36,7 +36,7 @@ def narrowed(
     samples: Samples,
     selected: Bool[np.ndarray, "n"],
 ) -> None:
-    """Narrow down the smallest values around samples."""
+    """Refine the smallest values around samples."""
     sample, value, item = low_points(samples, selected)
     if not len(sample):
         return
@@ -53,7 +53,7 @@ def narrowed(
 
 
 def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[np.ndarray, "j"], ...]:
-    """Samples no larger than their neighbours, where a parabola of twice their curvature could be smallest."""
+    """Samples not larger than their neighbours, at which a parabola of twice their curvature could be smallest."""
     values, motion = samples.values, samples.motion
     smallest = np.full((values.shape[1], len(selected)), np.inf)
     lowest = values.min(0)
@@ -62,7 +62,7 @@ def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[n
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
-    with np.errstate(invalid="ignore"):  # infinities beside infinities
+    with np.errstate(invalid="ignore"):  # inf - inf between neighbours
         is_low &= (np.ptp(values, axis=0) > LEVEL) & selected[motion]
     sample, value, item = np.nonzero(is_low)
     current, last = values[sample, value, item], len(values) - 1
@@ -74,7 +74,7 @@ def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[n
 
 
 def _values(values_at: Callable, minima: np.ndarray, motion: np.ndarray, points: np.ndarray, criterion: np.ndarray):
-    # Return values (j, m) of each candidate's own criterion; the smallest values of all criteria are lowered.
+    # Return values (j, m) of each candidate's own criterion, and lower the smallest values of all criteria.
     count = points.shape[1]
     motions = np.repeat(motion, count)
     attained = values_at(motions, points.ravel())
@@ -84,7 +84,7 @@ def _values(values_at: Callable, minima: np.ndarray, motion: np.ndarray, points:
 
 
 def _vertex(points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    # Find the vertex of the parabola through three points; if it has no minimum within them, the lowest of the points.
+    # Return the vertex of the parabola through three points; if it has no minimum within them, the lowest point.
     (a, b, c), (x, y, z) = points.T, values.T
     with np.errstate(invalid="ignore", divide="ignore"):
         top = (b - a) ** 2 * (y - z) - (b - c) ** 2 * (y - x)

@@ -1,11 +1,11 @@
-"""Bounds of contacts, depth and limits on the pose, which depend on the pose alone, on blocks of a platform's motions.
+"""Bounds on blocks of contacts, of the depth, and of limits on the pose, which depend on a platform's pose alone.
 
-Two cables are separated where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: this is linear in
-the points, so that the ends of the cables are enough. A cable is off the platform where its vector v from its corner,
-in platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole
-block. The e of the middle is taken: along the shortest vector between the cables, or along the residual of the
-projection of the cable onto the sector (Moreau). Between times h apart a function f with |f''| <= C stays above its
-smaller end less C h^2 / 8.
+Two cables do not touch if some unit vector e has e . (x_j - x_i) > 0 for all points x of both; as this is linear in the
+points, the ends of the cables are enough. A cable does not touch the platform if its vector v from its corner, in
+platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a full
+block; here e is that of the middle: along the shortest vector between the cables, or along the residual of the
+projection of the cable onto the sector (Moreau). Between times at a distance h a function f with |f''| <= C stays above
+its smaller end value less C h^2 / 8.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from cspr_jax.robots.statics.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 
-# Steps of a block, and the times at their ends, from -1 to 1.
+# Number of steps of a block, and the times at their ends, from -1 to 1.
 STEPS = 4
 OFFSETS = np.linspace(-1.0, 1.0, STEPS + 1)
-# Rounding error of lengths and heights, over the largest coordinate.
+# Rounding error of lengths and heights over the largest coordinate.
 POSE_ERROR = 1e-13
 TINY = 1e-30
 
@@ -44,14 +44,14 @@ class PoseBounds(NamedTuple):
     """Bounds and attained values of n blocks.
 
     Fields:
-        clear: (n,) lower bound of the distances between cables that can meet, and of the distances of cables from the
+        clear: (n,) lower bound of the distances between cables that can touch, and of the distances of cables from the
             sectors of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
-        nodes: (n_instants, n_criteria + 1, n) attained slacks at times a step apart; the smallest distance between
-            cables, m. Without margins the smallest of each: (1, n_criteria + 1, n).
-        offset: (n,) where in the block the smallest of these slacks is, from -1 to 1; 0 with margins.
-        deviations: (3, n) C h^2 / 8, by which motions between two times may depart from the chord: of the mass centre,
-            m; of a point of the platform beside it, over its distance; of vectors as the platform sees them, m.
+        nodes: (n_instants, n_criteria + 1, n) attained slacks at the ends of steps, then the smallest distance between
+            cables, m. Without margins only the minimum of each: (1, n_criteria + 1, n).
+        offset: (n,) time in the block at which the smallest of these slacks is, from -1 to 1; 0 with margins.
+        deviations: (3, n) bounds C h^2 / 8 of deviations from the chord between two times: of the mass centre, m; of a
+            point of the platform, over its distance from the mass centre; of vectors in platform axes, m.
     """
 
     clear: Array
@@ -63,14 +63,14 @@ class PoseBounds(NamedTuple):
 
 class _Deviations(NamedTuple):
     # Deviations (n,) from the chord between two times, C h^2 / 8: of the centre, m; of an arm of unit length; of
-    # vectors seen from the platform, m.
+    # vectors in platform axes, m.
     centre: Array
     arm: Array
     seen: Array
 
 
 def of_pose(problem: Problem) -> list[Limit]:
-    """The limits on the pose that are set."""
+    """The limits on the pose that are given."""
     return [limit for limit in limits_set(problem.limits) if not limit.of_motion]
 
 
@@ -78,7 +78,7 @@ def of_pose(problem: Problem) -> list[Limit]:
 def pose_blocks(
     problem: Problem, platform, one: Float[Array, ""], items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
 ) -> PoseBounds:
-    """Bounds on blocks."""
+    """Bounds of all criteria of the pose on blocks."""
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
 
@@ -114,7 +114,7 @@ def pose_blocks(
         if margins and pairs:
             squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
             values.append(jnp.sqrt(smallest(squares)))
-        # Pack two real numbers into one complex number, so that one loop computes both.
+        # Pack two real numbers into a complex number, so that one loop computes both.
         return lax.complex(clear, values[0]), *values[1:]
 
     first, *others = lax.map(on, OFFSETS)
@@ -137,9 +137,9 @@ def pose_blocks(
 
 
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
-    # Find unit vectors between cables, one a pair, and away from sectors, one a cable, by the pose in the middle. All
-    # pairs, or cables, are computed at a time, components (m, n) with lanes last: XLA then uses vectors, in little
-    # code.
+    # Find a unit vector for each pair of cables, and one away from the sector for each cable, from the pose in the
+    # middle. All pairs, or cables, are computed together, with components (m, n) and lanes last: so XLA uses vectors,
+    # with little code.
     position, rotation = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
     rays = materialized([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
@@ -155,7 +155,7 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
 
 
 def _units(vectors: Vector) -> list[Vector]:
-    # Return m unit vectors along vectors with components (m, n).
+    # Return the unit vectors along m vectors with components (m, n).
     scale = 1.0 / jnp.sqrt(jnp.maximum(dot(vectors, vectors), TINY))
     columns = [x * scale for x in vectors]
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
@@ -199,8 +199,8 @@ def _slacks(problem: Problem, segments: PlatformSegment, current: StateLanes, ca
 
 
 def _steps(problem: Problem, segments: PlatformSegment, deviations: _Deviations) -> list[Array]:
-    # Bound how far the slacks of `_slacks` may fall below their values at two times; a length is convex along the
-    # chord of its ray.
+    # Bound how far the slacks of `_slacks` may fall below their values at two times; a length is convex along the chord
+    # of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * deviations.centre / z0]
     factor, unit = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
@@ -208,7 +208,7 @@ def _steps(problem: Problem, segments: PlatformSegment, deviations: _Deviations)
     for limit in of_pose(problem):
         allowed = getattr(problem.limits, limit.name)
         if limit.quantity == "depth":
-            # The mass centre swings in a plane: on level paths it keeps its depth.
+            # The mass centre oscillates in a plane: on level paths its depth is constant.
             steep = jnp.sqrt(jnp.sum(segments.plane[:, 2] ** 2, axis=1))
             steps.append((steep * deviations.centre + jnp.max(arms) * deviations.arm) * factor / unit)
         else:

@@ -1,7 +1,7 @@
-"""Proofs about contacts, depth and limits on the pose, which depend on a platform's pose alone.
+"""Proofs of contacts, depth and limits on the pose, which depend on a platform's pose alone.
 
 A motion is clear if all of its blocks are clear (`pose_blocks`). It has a contact if two cables, or a cable and the
-platform, are proved to meet between two times (`cable_contacts`). Else, after many halvings, it is undecided.
+platform, are proved to touch between two times (`cable_contacts`). Otherwise, after many halvings, it is undecided.
 """
 
 from __future__ import annotations
@@ -30,31 +30,31 @@ from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 
-# Blocks per arc to begin with, for margins.
+# Number of blocks per arc at first, if margins are wanted.
 PARTS = 8
-# The same for verdicts alone, as in `tension_proof`: at cusps, and halfway between two cusps, where a platform moves
+# The same for verdicts alone, as in `tension_proof`: at cusps, and halfway between two cusps, where platforms are
 # fastest.
 FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
 TOUCH = 1e-9  # distances below this fraction of the platform's radius are undecided
-NEAR_CONTACT = 5  # halvings of a block after which contacts are searched for
+NEAR_CONTACT = 5  # contacts are searched for after this many halvings of a block
 # Times halfway between those of a block, from -1 to 1.
 MIDDLES = 0.5 * (OFFSETS[1:] + OFFSETS[:-1])
 
 
 @dataclasses.dataclass(frozen=True)
 class PoseProof:
-    """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are set.
+    """Proofs for n motions; criteria are the depth below the spools and the given limits on the pose.
 
     Fields:
-        is_proved: (n,) whether there is no contact, and every criterion is met, at every time.
+        is_proved: (n,) whether there is no contact at any time, and every criterion is always met.
         is_refuted: (n,) whether there is a contact, or a criterion is broken at some time.
-        met: (n,) whether two cables meet.
-        hit: (n,) whether a cable lies on the platform.
+        met: (n,) whether two cables touch.
+        hit: (n,) whether a cable touches the platform.
         attained: (n, n_criteria + 1) smallest slacks at the samples, and smallest distance between cables.
-        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
-        refuted_tau: (n,) tau at which a criterion is broken by most, or in the middle of a step with a contact; NaN
-            where there is neither.
-        motion: (k,) motion of each of the first blocks.
+        bound: (n, n_criteria) proved lower bounds; NaN for motions that are not proved.
+        refuted_tau: (n,) tau at which a criterion is violated most, or in the middle of a step with a contact; NaN if
+            there is neither.
+        motion: (k,) index of the motion of each of the first blocks.
         first: bounds of the first blocks.
     """
 
@@ -73,7 +73,7 @@ class PoseProof:
 def cables_beside(
     problem: Problem, items, *, kind: PlatformMotionKind
 ) -> tuple[Float[Array, "n n_cables 3"], Float[Array, "n n_cables 3"]]:
-    """Cables at one time beside the middle of each of many blocks."""
+    """Cables of many blocks, each at one time beside the middle of its block."""
     segments, arcs, middles, off = items
     phase = phase_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     current = state(segments, arcs, phase, kind)
@@ -85,18 +85,18 @@ class PoseCertifier:
     """Certifier of contacts, depth and limits on the pose along motions of one robot on six cables.
 
     Args:
-        problem: robot, limits, amplitude.
-        batch: how many blocks are computed at a time.
-        count_samples: called with the number of samples that were computed.
+        problem: robot, limits and amplitude function.
+        batch: number of blocks computed at a time.
+        count_samples: called with the number of computed samples.
 
     Fields:
-        pairs: cables that can meet.
+        pairs: pairs of cables that can touch.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
-        """Find which cables can meet each other or the platform."""
+        """Find which cables can touch each other or the platform."""
         self._problem, self._kind, self._batch, self._count = touchable(problem), kind, batch, count_samples
         near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
         self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)

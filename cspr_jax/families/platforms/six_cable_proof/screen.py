@@ -1,7 +1,7 @@
-"""A cheap test of many motions of a platform: samples that refute most of them.
+"""Cheap test of many motions of a platform: a few samples refute most of them.
 
-Samples are computed in float32, which costs half; the one with the smallest tension is then computed in float64. So the
-screen refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
+Samples are computed in float32, at half the cost; the one with the smallest tension is computed again in float64. So
+the screen refutes nothing that float64 would not refute; motions that pass in float32 are checked in full anyway.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import balance, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-CHUNK = 8  # samples of one call
-FIRST = 2  # motions screened at a time, over those checked at a time
-FEWER = 8  # divisor of a batch: up to so many motions count as few
+CHUNK = 8  # number of samples in one call
+FIRST = 2  # number of motions screened at a time over the number checked at a time
+FEWER = 8  # up to a batch over this number of motions count as few
 
 
 @persistent_jit(static_argnames=("kind", "single_precision"))
@@ -45,7 +45,7 @@ def smallest_tensions(
     kind: PlatformMotionKind,
     single_precision: bool = False,
 ) -> tuple[Float[Array, "n"], Int[Array, "n"]]:
-    """Smallest normalised tension of many segments over some samples."""
+    """Smallest normalised tension over some samples, for many segments."""
     if single_precision:
         robot, segments = _in_units_of_spread(robot, segments)
     cast = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
@@ -58,15 +58,15 @@ def smallest_tensions(
         def at(phase):
             return lowest_tension(robot, segments, number, phase, kind)
 
-    # The loop returns one number: with several, XLA would compute the tension once for each of them.
+    # Return one number from the loop: with several, XLA would compute the tension once for each.
     values = row_by_row(at, table)
     lowest = values.min(0)
     return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
 
 def _in_units_of_spread(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
-    # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
-    # eighteenth order, which overflow float32. Tensions over their value at rest do not depend on the unit.
+    # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, and products of them
+    # of eighteenth order, which overflow float32. Tensions over their value at rest do not depend on the unit.
     unit = jnp.sqrt(jnp.mean(robot.base_points**2))
     smaller = dataclasses.replace(
         robot,
@@ -86,7 +86,7 @@ def _in_units_of_spread(robot: PlatformRobot, segments: PlatformSegment) -> tupl
 
 def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
     motions, inertia = swings(segments), robot.inertia / robot.mass
-    # The rotation leaves its axis e alone, so that e, and with it I e, has the same components in platform axes always.
+    # The rotation does not change its axis e, so e, and with it I e, always has the same components in platform axes.
     axis_inertia = tuple(dot([inertia[i, j] for j in range(3)], motions.axis) for i in range(3))
 
     def at(row):
@@ -114,7 +114,7 @@ def _rough_and_certain(
     *,
     kind: PlatformMotionKind,
 ) -> tuple[Array, Array]:
-    # Compute `smallest_tensions` in float32, and that tension again in float64, (n,) each.
+    # Compute `smallest_tensions` in float32, then the smallest tension again in float64, (n,) each.
     lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
     when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such sample
     if kind.from_rest:
@@ -128,11 +128,11 @@ class TensionScreen(NamedTuple):
 
     Fields:
         robot: the robot.
-        amplitude: A.
-        kind: of the motions.
-        threshold: largest tension that refutes.
-        batch: how many motions are computed in one call.
-        count_samples: called with the number of samples that were computed.
+        amplitude: amplitude function A.
+        kind: kind of the motions.
+        threshold: largest tension that refutes a motion.
+        batch: number of motions computed in one call.
+        count_samples: called with the number of computed samples.
     """
 
     robot: PlatformRobot
@@ -152,7 +152,7 @@ class TensionScreen(NamedTuple):
     def refuted(
         self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"], *, limits: bool = True
     ) -> Bool[np.ndarray, "n"]:
-        """Motions that some samples refute."""
+        """Tell which motions some samples refute."""
         del limits
         is_refuted = np.zeros(len(segments.rate), bool)
         for chunk in _chunks(tau):
@@ -160,7 +160,7 @@ class TensionScreen(NamedTuple):
             if not len(alive):
                 break
             remaining = segments if len(alive) == len(is_refuted) else take_segments(segments, alive)
-            if len(alive) <= device_batch_size(self.batch // FEWER):  # not worth two passes
+            if len(alive) <= device_batch_size(self.batch // FEWER):  # too few for two passes
                 is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.threshold)
                 continue
             self.count_samples(len(alive) * (len(chunk) + 1))
@@ -170,13 +170,13 @@ class TensionScreen(NamedTuple):
         return is_refuted
 
     def _lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        # Few motions, in float64.
+        # Screen a few motions in float64.
         self.count_samples(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
         return in_batches(kernel, segments, batch_size=self.batch // FEWER)[0]
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:
-    # Repeat the last sample, so that all chunks have one shape.
+    # Repeat the last sample, so that all chunks have the same shape.
     length = -(-len(tau) // CHUNK) * CHUNK
     return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)

@@ -1,15 +1,15 @@
-"""Criteria of a platform's motion as slacks at one time: taut cables, no singularity, below the spools, limits.
+"""Criteria of a platform's motion as slacks at one time: taut cables, regular poses, below the spools, limits.
 
 With n the number of cables, f the tensions, m the mass:
 
-    taut           n z0 mu / g, the tension over its value at rest in P0 if all were equal
+    taut           n z0 mu / g, tensions over that of equal cables at rest in P0
     regular        determinant (`robots.statics.wrench_balance.normalised_determinant`) over its value at rest in P0
     below          depth of the mass centre below the spool plane, over z0
     tension        (f - f_min) n / (m g),  (f_max - f) n / (m g)
     floor          (floor - z) / z0
     length, speed, acceleration    1 - value / largest
 
-Below the readable form follow functions of many platforms, one lane a case, of which the screen takes the tensions.
+After the readable form follow functions of many platforms, one lane a case; the screen uses those of tensions.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
-    """Flags that say which criterion is broken, one a criterion."""
+    """Flag of each criterion, raised if it is broken."""
     return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
@@ -67,9 +67,9 @@ def pose_slacks(
     return jnp.stack([*basic, *(jnp.min(x) for x in slacks)])
 
 
-# Below this volume of three of the cables over the product of their lengths they lie nearly in one plane, and the
-# rounding of the fast balance grows with the third power of the inverse volume: then it gives no tension, so that it
-# refutes nothing.
+# If the volume of three of the cables over the product of their lengths is below this, they lie nearly in one plane.
+# Rounding of the fast balance grows with the third power of the inverse volume: then it gives no tension, and refutes
+# nothing.
 FLAT = 1e-3
 
 
@@ -77,7 +77,7 @@ def _balanced(robot: PlatformRobot, current: StateLanes, cables: CableLanes, squ
     def slowed(vector):
         return tuple(x / squared for x in vector)
 
-    # The moment is of second order in time like the force: omega enters squared.
+    # Like the force, the moment is of second order in time: omega enters squared.
     force, moment = inertial_wrench(
         robot, slowed(current.acceleration), current.rotation, current.omega, current.angular_acceleration
     )
@@ -91,7 +91,7 @@ def _is_flat(cables: CableLanes, balance: Balance) -> Array:
 
 
 def _smallest_tension(rate: Array, balance: Balance) -> Array:
-    # Return the smallest tension over its value at rest in P0 if all were equal.
+    # Return the smallest tension over that of equal cables at rest in P0.
     fraction = CABLES / (rate * balance.denominator)
     return smallest([x * fraction for x in balance.numerators])
 
@@ -99,7 +99,7 @@ def _smallest_tension(rate: Array, balance: Balance) -> Array:
 def certain_tension(
     rate: Float[Array, "n"], regular: Float[Array, "n"], cables: CableLanes, balance: Balance
 ) -> Float[Array, "n"]:
-    """The smallest tension, where the fast balance gives one."""
+    """The smallest tension where the fast balance gives one."""
     lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
     return jnp.where(_is_flat(cables, balance), jnp.inf, lowest)
 
@@ -107,7 +107,7 @@ def certain_tension(
 def lowest_tension(
     robot: PlatformRobot, segment: PlatformSegment, arcs: Array, phase: PhaseLanes, kind: PlatformMotionKind
 ) -> Float[Array, "n"]:
-    """The smallest tension at one time of many segments."""
+    """The smallest tension of many segments at one time."""
     current = state(segment, arcs, phase, kind)
     cables = cable_lanes(robot, current.position, current.rotation)
     balance = _balanced(robot, current, cables, squared_duration(segment, arcs))
@@ -117,7 +117,7 @@ def lowest_tension(
 def moving_slacks(
     problem: Problem, segment: PlatformSegment, arcs: Array, phase: PhaseLanes, kind: PlatformMotionKind
 ) -> list[Array]:
-    """Smallest slacks of the criteria that depend on the motion, at one time of many segments."""
+    """Smallest slacks of the criteria that depend on the motion, of many segments at one time."""
     robot, limits = problem.robot, problem.limits
     current, squared = state(segment, arcs, phase, kind), squared_duration(segment, arcs)
     cables = cable_lanes(robot, current.position, current.rotation)
@@ -145,7 +145,7 @@ def moving_slacks(
 
 
 def static_slacks(problem: Problem, segment: PlatformSegment, current: StateLanes, cables: CableLanes) -> list[Array]:
-    """Smallest slacks of the criteria that depend on the pose alone, at one time of many segments."""
+    """Smallest slacks of the criteria that depend on the pose alone, of many segments at one time."""
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], current.position) / z0
@@ -173,7 +173,7 @@ def _smallest_slack(row: Limit, limits: Limits, each: list[Array], scale) -> Arr
 
 
 def order(limits: Limits) -> list[int]:
-    """Order of the criteria of `slacks.flags` among moving slacks and static ones, one after the other."""
+    """Index of each criterion of `slacks.flags` among moving slacks followed by static ones."""
     moving, static = _limit_rows(limits, of_motion=True), _limit_rows(limits, of_motion=False)
     criteria = ["taut", *moving, "regular", "below", *static]
     return [criteria.index(criterion) for criterion in ("taut", "regular", "below", *limits_set(limits))]

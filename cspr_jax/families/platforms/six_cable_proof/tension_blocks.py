@@ -4,9 +4,9 @@ With N_k and det J the determinants of Cramer's rule for the tension of cable k,
 
     kappa_k = 6 z0 N_k / (g det J(P0)),    D = det J / det J(P0),    slack of a taut cable = kappa_k / D
 
-are analytic on a block. They are computed at Chebyshev's nodes; what the polynomials through these values leave out is
-bounded on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D,
-and remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds
+are analytic on a block. They are computed at Chebyshev nodes; remainders of the polynomials through these values are
+bounded on ellipses of complex time by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D, and
+remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). The same holds for limits on tensions, speeds
 and accelerations of cables, `limit_blocks`: docs/theory.md.
 """
 
@@ -52,26 +52,26 @@ from cspr_jax.robots.statics.wrench_lanes import CABLES, balance, cable_lanes, i
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 
-# Rounding error of a value at a node over its bound on real time (tests find a tenth of that); Lebesgue's constant
+# Rounding error of a value at a node over its bound on real time (ten times what tests find); Lebesgue's constant
 # multiplies it for the polynomial through such values, and Bernstein coefficients add a fraction of the values.
 NODE_ERROR = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
 REGULAR = CABLES  # index of D among the values
-BASIC = 2  # criteria that are no limits
+BASIC = 2  # number of criteria that are no limits
 
 
 class TensionBounds(NamedTuple):
-    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are set.
+    """Slacks on n blocks: of taut cables, of the determinant (D), and of the given limits on the motion.
 
     Fields:
-        nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up: no lower than they truly are; infinite
-            where D is not certainly positive. With margins the slack of the determinant is that of
-            `wrench_lanes.normalised_determinant` over its value at rest in P0. Reduced to their
-            minima: (1, n_criteria, n).
-        offset: (n,) where in the block the smallest of the minima is, from -1 to 1; 0 where all nodes are kept.
+        nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up so that they are not below the true
+            ones; infinite where D is not certainly positive. With margins the slack of the determinant is that of
+            `wrench_lanes.normalised_determinant` over its value at rest in P0. Reduced to their minima: (1, n_criteria,
+            n).
+        offset: (n,) time in the block of the smallest of the minima, from -1 to 1; 0 if all nodes are kept.
         bound: (n_criteria, n) proved lower bounds.
-        rounding: (n,) largest allowance for rounding in the slacks of taut cables, before they are divided by D.
-        allowed: (n,) largest allowance in all, which includes what the polynomials leave out.
+        rounding: (n,) largest allowance for rounding in the slacks of taut cables, before division by D.
+        allowed: (n,) largest total allowance, including the remainders of the polynomials.
     """
 
     nodes: Array
@@ -90,7 +90,7 @@ class _Block(NamedTuple):
 
 
 def of_motion(problem: Problem) -> list[Limit]:
-    """The limits on the motion that are set."""
+    """The limits on the motion that are given."""
     return [row for row in limits_set(problem.limits) if row.of_motion]
 
 
@@ -100,7 +100,7 @@ def tension_blocks(
 ) -> TensionBounds:
     """Bounds of slacks on blocks."""
     interpolated = _interpolated(problem, one, items, kind=kind, margins=margins, single_precision=reduced)
-    # Values that only margins need come last, and are not bounded.
+    # Values that only margins need come last, and have no bounds.
     nodes, bound = _bounds(problem, interpolated)
     if margins:
         nodes[1] = nodes[1] * interpolated.values[:, len(interpolated.remainders)]
@@ -112,7 +112,7 @@ def tension_blocks(
 
 
 class TensionRange(NamedTuple):
-    """Tensions on n blocks, per mass and length, over those of six equal cables at rest in P0.
+    """Tensions on n blocks, per mass and length, over that of equal cables at rest in P0.
 
     Fields:
         low: (n_cables, n) proved lower bounds.
