@@ -1,4 +1,4 @@
-"""Affine bounds of oscillating SLERP over a block of time; formulas are those of `oscillating_slerp`."""
+"""Affine bounds of oscillating SLERP over a block of time, by the formulas of `oscillating_slerp`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, joined, no
 from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
-# Bound of the rounding error of derivatives by recurrences, over their magnitude or 1.
+# Bound of the rounding error of derivatives by recurrences, over the larger of their magnitude and 1.
 DERIVATIVE_ERROR = 1e-12
 # Largest second derivatives in y = r^2 of cos r, of sin r / r, and of the first two derivatives of sin r / r. The n-th
-# derivative of sin r / r is (-1/2)^n j_n(r) / r^n with the spherical Bessel function j_n, and is largest at 0, where it
-# is (-1/2)^n / (1 3 5 ... (2 n + 1)).
+# derivative of sin r / r is (-1/2)^n j_n(r) / r^n, with the spherical Bessel function j_n; its magnitude is largest at
+# 0, where it is (-1/2)^n / (1 3 5 ... (2 n + 1)).
 _SECOND_DERIVATIVES = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
 
 Bounds3 = tuple[AffineBounds, AffineBounds, AffineBounds]
@@ -60,8 +60,8 @@ def _half_vector(slerp: Slerp, values: tuple[AffineBounds, ...]) -> Bounds3:
 
 
 def _angle_ratio(s: AffineBounds) -> Bounds3:
-    # Signs of the derivatives alternate, and all grow in magnitude as s falls: their second derivatives are largest at
-    # the lower end.
+    # Derivatives alternate in sign, and their magnitudes grow as s falls: second derivatives are largest at the lower
+    # end.
     low = s.low()
     middle = angle_ratio(s.middle, 1.0 - s.middle**2, orders=4)
     steepest = angle_ratio(low, 1.0 - low**2, orders=5)
@@ -84,7 +84,7 @@ def _exponential(u: AffineBounds, u1: AffineBounds, u2: AffineBounds) -> Bounds3
 
 
 def _sinc(y: AffineBounds) -> tuple[AffineBounds, ...]:
-    # Their second derivatives may change sign.
+    # Second derivatives of these functions may change sign.
     cosine, *derivatives = sinc(y.middle)
     firsts = (-0.5 * derivatives[0], *derivatives[1:])
     half = 0.5 * y.half_range() ** 2

@@ -22,14 +22,14 @@ from cspr_jax.robots.model.state import State
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class FunctionMotion:
-    """Motion that a function of time gives; see `motion.motion.Motion`. It has no bounds.
+    """Motion given by a function of time; see `motion.motion.Motion`. It has no bounds.
 
     Fields:
         time: () duration, s.
         z0: () depth at which slacks are normalised, m.
-        factor: () by which time is stretched.
-        function: gives positions (3,) m, of a platform with quaternions behind them (7,), at times () s; known when
-            a function is compiled.
+        factor: () factor that stretches time.
+        function: maps times () s to positions (3,) m, for a platform to positions and quaternions (7,); static when
+            functions are compiled.
     """
 
     time: Array
@@ -60,14 +60,14 @@ class FunctionMotion:
         return jnp.zeros(0)
 
     def stretched(self, factor: float) -> "FunctionMotion":
-        """The motion run more slowly, or faster; see `Spline.stretched`."""
+        """The motion, run slower or faster by a factor of time; see `Spline.stretched`."""
         return dataclasses.replace(self, factor=as_float64(self.factor * factor))
 
 
 def function_motion(
     function: Callable, duration: float, *, frame: Frame, reference: Float[np.ndarray, "4"], is_platform: bool
 ) -> FunctionMotion:
-    """Motion of a function that gives positions in the axes of a robot file, in the axes of the kernels."""
+    """Motion of a function with positions in the axes of a robot file, converted to the axes of the kernels."""
     try:
         shape = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
     except TypeError as error:

@@ -1,4 +1,4 @@
-"""Leg of splines: poses at their times, joined by piecewise polynomials, or motions of files."""
+"""Leg of splines: poses at given times, joined by piecewise polynomials, or motions from files."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ from cspr_jax.verification.proved_answers import proved_answers
 
 
 class Splines(Leg):
-    """Poses at their times, and files of samples, joined by piecewise polynomials; see `Leg`."""
+    """Poses at given times, and files of samples, joined by piecewise polynomials; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse poses without times, and keys of other families."""
@@ -62,12 +62,12 @@ class Splines(Leg):
         return proved_answers(problem, motions, scene), list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Notes of files, and hints at what their samples make likely; see `Leg.warnings`."""
+        """Notes about files, and hints at probable mistakes in their samples; see `Leg.warnings`."""
         return self._notes
 
     @property
     def _runs(self) -> list[tuple[int, int]]:
-        # Indices of the first and the last pose of each curve: a file, or poses up to one whose velocity is given.
+        # Indices of the first and the last pose of each curve: one of a file, or poses up to one with a given velocity.
         poses, ends = self.waypoints.poses, []
         for i in range(1, len(self) + 1):
             stops_here = poses[i].rest or (poses[i].velocity is not None and not self._is_hermite)
@@ -134,18 +134,18 @@ class Splines(Leg):
             raise InputError("point", "origin", '"mass-centre", whose positions functions and motions give')
 
     def _cleaned(self, name: str, source: Any) -> Any:
-        # Remove the noise if the plan states it, else report it.
+        # Remove the noise if the plan states its size, else report it.
         lines: list[str] = []
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.waypoints.robot_file.base_points))]
             noise, settings = list[str](), self.waypoints.plan_file
             if settings.smooth is not None:
-                from cspr_jax.curves.smoothing import smoothed  # takes time, and few records are noisy
+                from cspr_jax.curves.smoothing import smoothed  # slow to import, and few records are noisy
 
                 source = smoothed(source, settings.smooth, interpolation=settings.interpolation, ends=settings.ends)
             elif source.velocities is None:
                 noise = noise_notes(source)
-            # Speeds at the ends of a noisy record say nothing.
+            # Speeds at the ends of a noisy record have no meaning.
             lines += noise or moving_ends(source, settings.ends)
         self._notes += [f"{name}: {line}" for line in (*getattr(source, "notes", ()), *lines)]
         return source
@@ -211,6 +211,6 @@ class Splines(Leg):
             raise ConfigError(waypoints.path, f"{waypoints.name(first)} to {waypoints.name(last)}: {error}") from error
 
     def _rate(self, pose, name: str) -> list[float]:
-        # A pose at rest has neither velocity nor acceleration.
+        # A pose at rest has zero velocity and acceleration.
         value = getattr(pose, name)
         return value if value is not None else [0.0 if pose.rest else np.nan] * 3

@@ -1,6 +1,6 @@
 """Smallest number of arcs of many segments, with duration, margin and verdict.
 
-A screen bounds the margin of every number of arcs from above; `families.swings.decide` decides about the survivors.
+A screen bounds the margin of every number of arcs from above; `families.swings.decide` decides the remaining ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cspr_jax.robots.model.point_mass import AT_P0, LARGEST_LENGTH, PointMassRob
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 
-# Largest number of segments that each thread holds at a time.
+# Largest number of segments that each thread holds in memory at a time.
 PART = 16 * screen.BATCH
 
 
@@ -58,7 +58,7 @@ def minimum_arcs(
 ) -> Answers:
     """Smallest number of arcs of each segment from a start to an end.
 
-    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
+    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are in float64.
     """
     check_numbers(problem.robot, z0, max_arcs)
 
@@ -67,7 +67,7 @@ def minimum_arcs(
         points = (starts[rows], ends[rows], z0[rows])
         return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
 
-    # Segments that fit into one batch are not divided.
+    # Do not divide segments that fit into one batch.
     return (
         joined(in_parts(part, len(z0), device_batch_size(PART)))
         if len(z0) > device_batch_size(screen.BATCH)
@@ -122,8 +122,8 @@ def check_numbers(robot: PointMassRobot, z0: Float[np.ndarray, "n"], max_arcs: i
 def _screened(
     problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return the upper bounds (n, max_arcs) of the screen, and the slacks (n, n_criteria) at the two ends, which are the
-    # same for all numbers of arcs.
+    # Return the upper bounds (n, max_arcs) of the screen, and the slacks (n, n_criteria) at both ends, which do not
+    # depend on the number of arcs.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(screen.upper_bounds, max_arcs=max_arcs)
     upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, batch_size=screen.BATCH).astype(float)

@@ -24,7 +24,7 @@ class MinimumArcsMap(PointMassMap):
     any_cables = True
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
-        """Refuse a planar robot; build what all tiles share."""
+        """Refuse a planar robot, and build what all tiles use."""
         if robot_file.is_planar:
             raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
         super().__init__(robot_file, sweep_file, file)
@@ -36,7 +36,7 @@ class MinimumArcsMap(PointMassMap):
         settings: dict[str, Any] = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
         if self._scene is None:
             return minimum_arcs(self._problem, *points, **settings).arrays()
-        # Maps without obstacles need no proofs of any motion.
+        # Import here: maps without obstacles need no general proof.
         from cspr_jax.verification.bounds.batch import MotionBatch
         from cspr_jax.verification.verifier import Verifier
 
@@ -55,7 +55,7 @@ class MinimumArcsMap(PointMassMap):
         self._refuse_long(grid)
 
     def _refuse_long(self, grid: Grid) -> None:
-        # The nearest point of a product grid to a spool is nearest in each coordinate.
+        # The point of a product grid that is nearest to a spool is nearest in each coordinate.
         longest = self._problem.limits.cable_length_max
         if longest is None or "radius" in grid.axes:
             return

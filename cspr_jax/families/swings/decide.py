@@ -1,9 +1,9 @@
-"""Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
+"""Answers from upper bounds of the margin for each number of arcs: proofs first, margins after.
 
-The candidates that the bounds leave are proved or refuted in increasing order, until one is proved feasible. Bisection
-would be wrong: more arcs can lose margin (tests). Where none is feasible, `families.swings.refusals` names the limits
-that refuse the candidates whose cables stay taut, and one of these candidates is reported; if there is none, the
-candidate with the largest margin. `families.platforms.answers` does the same for platforms.
+Candidates that the bounds leave are proved or refuted in increasing order until one is proved feasible. Bisection would
+be wrong, since more arcs may reduce the margin (tests). If none is feasible, `families.swings.refusals` names the
+limits that refuse candidates with taut cables, and one of these candidates is reported; if there is no such candidate,
+the one with the largest margin. `families.platforms.answers` does the same for platforms.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
-# Segments computed at a time where little is computed for each.
+# Number of segments computed at a time if each takes little work.
 BATCH = 4096
-# Candidates whose margins differ by less are equally good; the first of them is reported.
+# Candidates whose margins differ by less count as equal; the first of them is reported.
 TIE = 1e-9
-# The second, denser screen; samples are multiples of 4.
+# Samples per arc of the second, denser screen, a multiple of 4.
 SAMPLES_PER_ARC = 32
 MAX_SAMPLES = 1024
-DENSE_BATCH = 512  # segments at a time: few need it
+DENSE_BATCH = 512  # number of segments at a time: few need this screen
 
 
 @persistent_jit
@@ -54,11 +54,11 @@ def _durations(arguments) -> jax.Array:
 
 
 class ProvedArcs(NamedTuple):
-    """Numbers of arcs proved feasible by other means than `families.swings.proof.verdicts`.
+    """Numbers of arcs that other means than `families.swings.proof.verdicts` have proved feasible.
 
     Fields:
-        arcs: (n,) one for each segment; 0: none.
-        bound: (n,) proved lower bound of its margin.
+        arcs: (n,) one number for each segment; 0 for none.
+        bound: (n,) proved lower bound of the margin.
     """
 
     arcs: np.ndarray
@@ -110,9 +110,9 @@ def decided(
 
 @persistent_jit
 def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Array, "n n_criteria"]:
-    """Smallest slack of each criterion at the two ends.
+    """Smallest slack of each criterion at both ends.
 
-    There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
+    At the ends the velocity is zero and the acceleration that of a pendulum, for any number of arcs.
     """
 
     def one(segment):
@@ -125,7 +125,7 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Ar
 
 
 def as_prescribed(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max_arcs"]:
-    """Upper bounds, -inf for numbers of arcs other than the prescribed one, or smaller than a prescribed minimum."""
+    """Upper bounds; -inf for numbers of arcs other than a prescribed one, or below a prescribed minimum."""
     if arcs is None:
         return upper
     fixed, number = np.asarray(arcs)[:, None], np.arange(1, upper.shape[1] + 1)
@@ -134,7 +134,7 @@ def as_prescribed(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarra
 
 class _Search(NamedTuple):
     # The smallest number of arcs proved feasible; whether a smaller one stayed undecided; the proved margin; whether
-    # some number of arcs is feasible for the planned robot, though perhaps not within the uncertainty; and the limits
+    # some number of arcs is feasible for the planned robot, though maybe not within the uncertainty; and the limits
     # that candidates break at samples, (n, max_arcs, n_criteria).
     smallest: np.ndarray
     doubtful: np.ndarray
@@ -176,7 +176,7 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, p
 
 
 class _Shown(NamedTuple):
-    # Numbers of arcs that are reported (n,), their smallest slacks, and the criteria that they break, (n, n_criteria).
+    # Reported numbers of arcs (n,), their smallest slacks, and the criteria that they break, (n, n_criteria).
     tried: np.ndarray
     slack: np.ndarray
     broken: np.ndarray
@@ -190,10 +190,10 @@ def _shown(
     basic: np.ndarray,
     measure: Callable,
 ) -> _Shown:
-    # Choose what is reported; `with_limits` and `basic` are upper bounds (n, max_arcs) of the margin over all criteria,
-    # and over the criteria that are no limits.
+    # Choose the reported numbers of arcs; `with_limits` and `basic` are upper bounds (n, max_arcs) of the margin over
+    # all criteria, and over the criteria that are no limits.
     fixed, by_cables = search.smallest.copy(), np.zeros(len(with_limits), bool)
-    # Without limits, or with an undecided candidate, the largest margin says enough.
+    # Without limits, or with an undecided candidate, report the largest margin.
     is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
     refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
     why = refusals(problem, rows_of(parities, refused), basic[refused], search.broken[refused])
@@ -202,7 +202,7 @@ def _shown(
     tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)
     broken = slack <= 0.0
     broken[refused] = why.broken
-    # If no candidate is taut, name a cable or the spools, and the limits that no number of arcs keeps.
+    # If no candidate keeps cables taut, name a cable or the spools, and the limits that every number of arcs breaks.
     rows, is_limit = np.flatnonzero(by_cables), np.arange(slack.shape[1]) >= BASIC
     broken[rows] = slack[rows] <= 0.0
     suspects = broken[rows] & is_limit
@@ -218,8 +218,8 @@ def _best(
     by_cables: np.ndarray,
     measure: Callable,
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return the fixed number of arcs, else the one with the largest margin, over the cables alone or over all criteria,
-    # and its slacks. Where the cables alone choose, limits are measured only for what is chosen.
+    # Return the fixed number of arcs, else the one with the largest margin, for the cables alone or for all criteria,
+    # and its slacks. If the cables alone decide, limits are computed only for the chosen number.
     tried, slack = fixed.copy(), np.empty((len(fixed), len(criteria.flags(problem.limits))))
     free = np.flatnonzero((fixed == 0) & ~by_cables)
     if len(free):
@@ -228,7 +228,7 @@ def _best(
     if len(free):
         without_limits = problem._replace(limits=NO_LIMITS)
         tried[free], _ = _largest_margins(without_limits, rows_of(parities, free), upper[free], measure)
-        # None of them is feasible, so each criterion is refined at once.
+        # None of these is feasible, so refine all criteria together.
         slack[free] = each_margin(problem, pick(parities, free, tried[free]), tried[free])
     chosen = np.flatnonzero(fixed > 0)
     if len(chosen):
@@ -239,7 +239,8 @@ def _best(
 def _largest_margins(
     problem: Problem, parities: dict[int, Segment], upper: np.ndarray, measure: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return the numbers of arcs with the largest margins, and their slacks; upper bounds give the order.
+    # Return the numbers of arcs with the largest margins, and their slacks; try candidates in the order of upper
+    # bounds.
     upper = np.fmin(upper, _denser_upper_bounds(problem, parities, upper.shape[1]))
     tried = np.argmax(upper, axis=1) + 1
     slack = measure(problem, pick(parities, np.arange(len(tried)), tried), tried)
@@ -250,14 +251,14 @@ def _largest_margins(
         rows = np.flatnonzero(is_open.any(1))
         if not len(rows):
             return tried, slack
-        # The next ones of each segment, as many as fill a batch, which takes no longer when it is full.
+        # Take the next candidates of each segment until a batch is full: a full batch takes no longer.
         order = np.argsort(-upper[rows], axis=1, kind="stable")[:, : max(BATCH // len(rows), 1)]
         owner, turn = np.nonzero(np.take_along_axis(is_open[rows], order, axis=1))
         segment, arcs = rows[owner], order[owner, turn] + 1
         candidate, bound = measure(problem, pick(parities, segment, arcs), arcs), upper[segment, arcs - 1]
         upper[segment, arcs - 1] = -np.inf
         for rank in range(order.shape[1]):
-            # Take them one by one, so that a choice between equals does not depend on what else is in the batch.
+            # Compare them one by one, so that ties do not depend on what else is in the batch.
             due = np.flatnonzero((turn == rank) & (bound > _improvement(best)[segment]))
             due = due[candidate[due].min(1) > best[segment[due]]]
             row = segment[due]
@@ -269,14 +270,14 @@ def _improvement(best: np.ndarray) -> np.ndarray:
 
 
 def _denser_upper_bounds(problem: Problem, parities: dict[int, Segment], max_arcs: int) -> np.ndarray:
-    # The first screen has a sample an arc or two, which bounds the margins of many arcs loosely.
+    # The first screen has only one or two samples per arc, which bound the margins of many arcs loosely.
     samples = min(SAMPLES_PER_ARC * max_arcs, MAX_SAMPLES)
     kernel = partial(upper_bounds, max_arcs=max_arcs, samples=samples)
     return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), batch_size=DENSE_BATCH)
 
 
 def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.ndarray) -> Tolerated:
-    # Return the multiples of all segments: NaN of those that are not feasible as planned, and without an uncertainty.
+    # Return the multiples for all segments; NaN for those not feasible as planned, and without an uncertainty.
     multiples = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
     if problem.limits.uncertainty is not None and len(rows):
         picked = jax.tree.map(lambda array: np.asarray(array)[rows], segments)

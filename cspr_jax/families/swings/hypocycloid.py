@@ -4,15 +4,15 @@ The effector swings in a plane through p0, the point below the centroid at depth
 hypocycloid whose radius changes from r1 to r2; every arc ends in a cusp. With lambda = g / z0 the
 end accelerations are those of a pendulum hung from the centroid.
 
-Two forms of the same motion stand here. `motion` is the printed one, (2.32) to (2.48). `swing` is
+There are two forms of the same motion. `motion` is the printed one, (2.32) to (2.48). `swing` is
 the closed form: the hypocycloid is an ellipse, traversed p / 2 times, which slowly precesses by the
-angle delta = psi (p even) or pi - psi (p odd), so that all that oscillates fast is one sine and one
-cosine of p pi tau, which do not depend on the points. They agree to 1e-12 (tests).
+angle delta = psi (p even) or pi - psi (p odd). So only one sine and one cosine of p pi tau oscillate
+fast, and they do not depend on the points. Both forms agree to 1e-12 (tests).
 
 Degenerate cases. A rest end (a point at p0) makes the motion a straight line, delta = 0, and an odd
-p is allowed: its first swing goes away from the target. Where start and end lie on one line through
-p0 and the arcs still need a plane (psi = 0 with p odd, psi = pi with p even), the plane is the one
-least inclined to the spool plane. psi = 0 with p = 1 has no duration: (2.47) is 0.
+p is allowed: its first swing goes away from the target. If start and end lie on one line through p0
+and the arcs still need a plane (psi = 0 with p odd, psi = pi with p even), it is the plane with the
+smallest inclination to the spool plane. psi = 0 with p = 1 has no duration: (2.47) is 0.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.verification.bounds.swing_bounds import swing_bounds
 
-# Blocks of which bounds are computed at a time.
+# Number of blocks whose bounds are computed at a time.
 BATCH = 64
 
 
@@ -58,13 +58,13 @@ class Segment:
         center: (3,) the point p0, m.
         start_radius: () r1 of (2.39), m.
         end_radius: () r2, m.
-        precession: () delta, in half turns, in [0, 1].
-        sense: () +1 (p odd) or -1 (p even): sign of theta_h, (2.34).
+        precession: () precession angle delta, in half turns, in [0, 1].
+        sense: () +1 (p odd) or -1 (p even), the sign of theta_h, (2.34).
         rate: () lambda of (2.26), 1/s^2.
         end_curvature: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
         tilt: (2,) gradient of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
-        coupling: (n_cables, 2) one row for each cable, 1/m.
-        twist: (n_cables,) one for each cable, 1/m^2.
+        coupling: (n_cables, 2) coupling vector of each cable, 1/m.
+        twist: (n_cables,) twist of each cable, 1/m^2.
     """
 
     plane: Array
@@ -85,8 +85,8 @@ def couplings(
 ) -> tuple[Float[Array, "n"], Float[Array, "n_cables n"], Float[Array, "n_cables"]]:
     """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
 
-    With d = c + c'' / lambda and lambda = gravity / z0, from (2.12) to (2.14) divided by their value
-    at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + coupling_k . d + twist_k (c x d).
+    With d = c + c'' / lambda and lambda = gravity / z0, (2.12) to (2.14) divided by their value at rest in p0
+    give cable k the normalised pseudotension 1 + tilt . c + coupling_k . d + twist_k (c x d).
     """
     if robot.n_cables > robot.dof:
         nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
@@ -130,7 +130,7 @@ class Oscillation(NamedTuple):
     Fields:
         ratio: () nu = delta / (pi p) of the axes of the ellipse.
         steady: () theta_h^2 (n_h - 1) of (2.47): T^2 times the square of the frequency at constant radius.
-        period: () T^2 lambda: the same, less A''(1) of a transition, (1.29).
+        period: () T^2 lambda: the same as `steady`, less A''(1) of a transition, (1.29).
     """
 
     ratio: Array
@@ -141,7 +141,7 @@ class Oscillation(NamedTuple):
 def oscillation(segment: Segment, arcs: Num[Array, ""]) -> Oscillation:
     """The fast part of a segment."""
     ratio = segment.precession / arcs
-    # 1 - ratio comes first: it vanishes for p = 1 and psi -> 0.
+    # 1 - ratio comes first, since it vanishes for p = 1 and psi -> 0.
     steady = (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio)
     return Oscillation(ratio, steady, steady - segment.end_curvature)
 
@@ -213,8 +213,8 @@ class Hypocycloid:
     """Motion along a hypocycloid, or a transition of chapter 1; see `Motion`.
 
     Fields:
-        segment: of the parity of `arcs`.
-        amplitude: A.
+        segment: segment of the parity of `arcs`.
+        amplitude: amplitude function A.
         arcs: () number of arcs, a float.
     """
 
@@ -252,7 +252,7 @@ def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
 
 @jax.jit
 def batch_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
-    """Bounds of the states of some motions, over one block of each."""
+    """Bounds of the states of a batch of motions, each over one block."""
     return jax.vmap(_block_bounds)(*cases)
 
 
@@ -261,7 +261,7 @@ def _block_bounds(segment: Segment, arcs: Array, block: TimeBounds) -> StateBoun
 
 
 def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Array, ""]:
-    """Left-hand side of (2.55): positive means that enough arcs make the segment feasible."""
+    """Left-hand side of (2.55); if it is positive, enough arcs make the segment feasible."""
     span = segment.end_radius - segment.start_radius
     ends = segment.start_radius + span * jnp.stack([amplitude.lowest, amplitude.highest]).astype(span.dtype)
     return 1.0 - jnp.max(jnp.abs(ends)) * jnp.linalg.norm(segment.tilt)
@@ -270,7 +270,7 @@ def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Arr
 def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Float[Array, ""]) -> Float[Array, ""]:
     """Smallest normalised pseudotension as the number of arcs of this parity grows, at one time.
 
-    1 - r(tau) |tilt . e_r(tau)|: exact, whereas (2.55) assumes the worst direction of the swing.
+    It is 1 - r(tau) |tilt . e_r(tau)|, which is exact; (2.55) assumes the worst direction of the swing.
     """
     r = segment.start_radius + (segment.end_radius - segment.start_radius) * derivatives(amplitude, tau, order=0)[0]
     lateral, axial = sincospi(segment.sense * segment.precession * tau)

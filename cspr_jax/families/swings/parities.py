@@ -1,4 +1,4 @@
-"""Segments of either parity of their numbers of arcs."""
+"""Selections of segments, for even and for odd numbers of arcs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cspr_jax.numerics.shapes import Int, Num
 
 
 def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
-    """Pick segments, each of the parity of its number of arcs."""
+    """Select segments, each of the parity of its number of arcs."""
     if parities[0] is parities[1]:
         return jax.tree.map(lambda array: np.asarray(array)[rows], parities[0])
     is_odd = arcs % 2 == 1
@@ -22,7 +22,7 @@ def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.
 
 
 def rows_of(parities: dict[int, Segment], rows: Int[np.ndarray, "m"]) -> dict[int, Segment]:
-    """Pick segments, of both parities."""
+    """Select segments for both parities."""
     return {
         parity: jax.tree.map(lambda array: np.asarray(array)[rows], segments) for parity, segments in parities.items()
     }

@@ -1,10 +1,10 @@
-"""Smallest numbers of arcs of swings of point masses on more cables than degrees of freedom: samples, then a proof.
+"""Smallest numbers of arcs of point masses on more cables than degrees of freedom: samples first, then a proof.
 
-The motion is that of three cables. With gravity / z0 = lambda, a pendulum's acceleration -lambda (p - P0) needs a force
-from p towards the centroid of the spools, which lies between them, so that below the spools tensions can supply it; the
-other terms fade with the number of arcs. What is tried in increasing order is refuted by samples, or else proved over
-its whole time (`verification.proved_answers`). Margins are distances of all tensions from their limits, over the weight
-per cable.
+The motion is that for three cables. With lambda = gravity / z0, the acceleration of a pendulum -lambda (p - P0) needs a
+force from p towards the centroid of the spools. The centroid lies between the spools, so below them tensions can supply
+the force; all other terms vanish with the number of arcs. Candidates are tried in increasing order; each is refuted by
+samples, or proved over its full time (`verification.proved_answers`). Margins are distances of all tensions from their
+limits, over the weight per cable.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from cspr_jax.verification.proved_answers import proof_of
 from cspr_jax.verification.smallest_proved import NONE, smallest_proved
 
 BATCH = 512
-FEW = 4  # samples an arc, to begin with
-MANY = 32  # before a proof
-# Slacks that are not those of limits: of the tensions, and of the depth below the spools.
+FEW = 4  # samples per arc at first
+MANY = 32  # samples per arc before a proof
+# Number of slacks that are not of limits: of the tensions, and of the depth below the spools.
 BASIC = 2
 
 
@@ -101,14 +101,14 @@ def redundant_arcs(
 
 
 def _measured(problem: Problem, *, segments: Segment, tried: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    # Smallest slacks of some of the segments with the numbers of arcs that are tried.
+    # Return smallest slacks of some of the segments, for the numbers of arcs that are tried.
     each = [least_slacks(problem, segments, np.array([i]), int(tried[i]), MANY, is_narrowed=True) for i in rows]
     return np.concatenate([np.empty((0, BASIC + len(other_limits(problem.limits)))), *each])
 
 
 class _Trials:
-    # Trials of numbers of arcs: the proved margins of those that are not refuted, and the number with the largest
-    # sampled slack among those that fail.
+    # Trials of numbers of arcs: proved margins of those that are not refuted, and the one with the largest sampled
+    # slack among those that are.
 
     def __init__(self, problem: Problem, parities: dict[int, Segment], count: int) -> None:
         self._problem, self._parities = problem, parities
@@ -154,7 +154,7 @@ def least_slacks(
     *,
     is_narrowed: bool = False,
 ) -> Float[np.ndarray, "m n_slacks"]:
-    """Smallest sampled slacks of segments with one number of arcs."""
+    """Smallest sampled slacks of segments that have the same number of arcs."""
     kernel, chosen = partial(_slacks_at, problem), jax.tree.map(lambda x: np.asarray(x)[rows], segments)
 
     def at(tau: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ def refusals(
     upper: Float[np.ndarray, "n max_arcs"],
     refuted: Bool[np.ndarray, "n max_arcs n_criteria"],
 ) -> Refused:
-    """Limits that refuse segments whose cables some number of arcs keeps taut."""
+    """Limits that refuse segments for which some number of arcs keeps cables taut."""
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero(~fewest.is_best & alive.any(1))
@@ -38,13 +38,13 @@ def refusals(
             continue
         taut = prove(problem._replace(limits=NO_LIMITS), pick(parities, rows, arcs), arcs).feasible
         rows, arcs = rows[taut], arcs[taut]
-        # One candidate of each segment after the other, since one may make the next ones superfluous.
+        # Take the candidates of each segment one after the other, since one may make the next ones superfluous.
         rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
         left = np.argsort(rank, kind="stable")
         while len(left):
             left = left[~fewest.is_best[rows[left]]]
             left = left[fewest.may_change(rows[left], refuted[rows[left], arcs[left] - 1])]
-            # The next ones of the same segments fill the batch, which takes no longer when it is full.
+            # Add the next candidates of the same segments until the batch is full: a full batch takes no longer.
             count = max(int(np.searchsorted(rank[left], rank[left[:1]], side="right").sum()), SMALL)
             batch, left = left[:count], left[count:]
             if len(batch):
@@ -57,8 +57,8 @@ def refusals(
 def _limits_of(
     problem: Problem, parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray, fewest: FewestLimits
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return which candidates with taut cables are certain to break limits, and these limits, (n, n_criteria). A
-    # candidate whose samples already break all limits that are left is not proved: it changes nothing.
+    # Return which candidates with taut cables certainly break limits, and these limits, (n, n_criteria). A candidate
+    # whose samples break all remaining limits is not proved: it changes nothing.
     segments = pick(parities, rows, arcs)
     coarse = first_pass(problem, segments, arcs.astype(float))
     is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC

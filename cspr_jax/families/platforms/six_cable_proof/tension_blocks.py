@@ -116,9 +116,9 @@ class TensionRange(NamedTuple):
 
     Fields:
         low: (n_cables, n) proved lower bounds.
-        high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
+        high: (n_cables, n) proved upper bounds; infinite if the determinant may vanish.
         rounding: (n,) as in `TensionBounds`.
-        allowed: (n,) likewise.
+        allowed: (n,) as in `TensionBounds`.
     """
 
     low: Array
@@ -148,8 +148,8 @@ def _allowances(interpolated: "_Interpolated") -> tuple[Array, Array]:
 
 
 class _Interpolated(NamedTuple):
-    # Values of blocks at the nodes (m, n_values, n), what the polynomials through the first n_rests of these values
-    # leave out (n_rests, n), and the part of this that is rounding.
+    # Values of blocks at the nodes (m, n_values, n), remainders of the polynomials through the first n_rests of these
+    # values (n_rests, n), and the part of the remainders that is rounding.
     block: _Block
     values: Array
     remainders: Array
@@ -203,7 +203,7 @@ def _interpolated(
 
 def _values(problem: Problem, block: _Block, current: StateLanes, *, margins: bool) -> list[Pair]:
     # Return the values at one node in pairs, each of which XLA computes in one loop: kappa and D, the factor of
-    # rounding, the values that the limits need, and the factor that turns D into the normalised determinant.
+    # rounding, values that limits need, and the factor that converts D to the normalised determinant.
     robot = problem.robot
     cables = cable_lanes(robot, current.position, current.rotation)
 
@@ -239,7 +239,7 @@ def _level(template: Array):
 
 
 def _quantities(problem: Problem) -> dict[str, list[Limit]]:
-    # Return the quantities that limits bound, each with its limits.
+    # Return the limited quantities, each with its limits.
     limits: dict[str, list[Limit]] = {}
     for limit in of_motion(problem):
         limits.setdefault(limit.quantity, []).append(limit)
@@ -255,7 +255,7 @@ def _lengths(robot: PlatformRobot, current: StateLanes) -> tuple[list[Array], li
 
 
 def _magnitude_bounds(problem: Problem, block: _Block, bounds: EllipseBounds, along: Array, lengths) -> list[Array]:
-    # Bound the magnitudes, on an ellipse, of the values of `_values`, in the same order, by Hadamard's inequality:
+    # Bound the magnitudes of the values of `_values` on an ellipse, in the same order, by Hadamard's inequality:
     # moments are in platform axes, over the mean arm times the norm of the rotation.
     robot, squared, z0 = problem.robot, block.squared, block.z0
     arm_lengths = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
@@ -292,8 +292,7 @@ def _magnitude_bounds(problem: Problem, block: _Block, bounds: EllipseBounds, al
 
 
 def _bounds(problem: Problem, interpolated: _Interpolated) -> tuple[list[Array], list[Array]]:
-    # Return the smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds,
-    # (n,) each.
+    # Return the smallest slacks at the nodes, (m, n) each, rounded up, and their lower bounds, (n,) each.
     remainders, block = interpolated.remainders, interpolated.block
     values = interpolated.values[:, : len(remainders)]
     coefficients = _coefficients(values)
@@ -303,7 +302,7 @@ def _bounds(problem: Problem, interpolated: _Interpolated) -> tuple[list[Array],
 
     one = slice(REGULAR, REGULAR + 1)
     regular, fraction = around(coefficients, remainders, one), around(values, interpolated.rounding, one)
-    # Among quotients with one denominator, the smallest has the smallest numerator.
+    # Quotients with the same denominator are smallest for the smallest numerator.
     minimum = jnp.min(coefficients[:, :CABLES] - remainders[None, :CABLES], axis=1, keepdims=True)
     doubt = jnp.max(interpolated.rounding[None, :CABLES], axis=1, keepdims=True)
     kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt

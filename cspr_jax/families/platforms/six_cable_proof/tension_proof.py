@@ -1,13 +1,13 @@
-"""Proofs about the tensions and the determinant of a platform's motions, between the samples too.
+"""Proofs of the tensions and the determinant of a platform's motions, also between samples.
 
-Every block of a motion (`tension_blocks`) is proved, or refuted by a sample, or halved. The motion is then
+Each block of a motion (`tension_blocks`) is proved, refuted by a sample, or halved. The motion is then
 
     proved       if every block is proved: no cable slack, no singularity, limits on the motion met
-    refuted      if some sample breaks a criterion by more than the tolerance
+    refuted      if a sample breaks a criterion by more than the tolerance
     undecided    if a block stays open although its slack is enclosed within half the tolerance, or after many halvings
 
-A limit that is touched counts as met: the slacks of limits are those of `problem.touchable`, and undecided within
-rounding alone.
+A touched limit counts as met: the slacks of limits are those of `problem.touchable`, and undecided only within
+rounding.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ from cspr_jax.robots.statics.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 
-# Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
-# are narrowed down from the samples of blocks, the number is fixed; for verdicts alone it grows from the first to the
-# second number with the amplitude, see `blocks.growing`.
+# Numbers of blocks of an arc at first, from rest and between poses, where orientations turn faster. If margins are
+# refined from the samples of blocks, the number is fixed; for verdicts alone it grows from the first to the second
+# number with the amplitude, see `blocks.growing`.
 WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
-# Orders of the cables that are tried, one after the other, where rounding keeps a block open.
+# Number of orders of the cables that are tried while rounding keeps a block open.
 ORDERS = 6
-MATTERS = 0.1  # fraction of the total allowance from which rounding matters
+MATTERS = 0.1  # rounding matters above this fraction of the total allowance
 
 
 @dataclasses.dataclass(frozen=True)
 class TensionProof:
-    """Proofs about n motions; criteria are those of `tension_blocks.TensionBounds`.
+    """Proofs for n motions; criteria are those of `tension_blocks.TensionBounds`.
 
     Fields:
-        is_proved: (n,) whether every criterion is met at every time.
-        is_refuted: (n,) whether some criterion is broken at a sample.
+        is_proved: (n,) whether every criterion is always met.
+        is_refuted: (n,) whether a criterion is broken at a sample.
         attained: (n, n_criteria) smallest slacks at the samples.
-        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
-        refuted_tau: (n,) tau at which a criterion is broken by most; NaN where none is.
-        motion: (k,) motion of each of the first blocks.
+        bound: (n, n_criteria) proved lower bounds; NaN for motions that are not proved.
+        refuted_tau: (n,) tau at which a criterion is violated most; NaN if none is.
+        motion: (k,) index of the motion of each of the first blocks.
         first: bounds of the first blocks.
     """
 
@@ -74,7 +74,7 @@ class TensionProof:
 
 
 class _Order(NamedTuple):
-    # The same robot with its cables in another order, and the sign that the order gives to determinants.
+    # The robot with its cables in another order, and the sign that this order gives to determinants.
     problem: Problem
     sign: float
     cables: list[int]
@@ -84,15 +84,15 @@ class Certifier:
     """Certifier of the tensions, the determinant and the limits on the motion of one robot on six cables.
 
     Args:
-        problem: robot, limits, amplitude.
-        batch: how many blocks are computed at a time.
-        count_samples: called with the number of samples that were computed.
+        problem: robot, limits and amplitude function.
+        batch: number of blocks computed at a time.
+        count_samples: called with the number of computed samples.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_samples: Callable[[int], None]
     ) -> None:
-        """Order the cables."""
+        """Choose orders of the cables."""
         problem = touchable(problem)
         self._kind, self._batch, self._count = kind, batch, count_samples
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
@@ -136,7 +136,7 @@ class Certifier:
     def _prove_again(
         self, proof: TensionProof, segments: PlatformSegment, arcs: np.ndarray, stuck: np.ndarray, ignored
     ) -> None:
-        # Without all nodes, values are in single precision, which cannot decide limits that are nearly touched.
+        # Reduced values are in single precision, which cannot decide limits that are nearly touched.
         is_near = (proof.attained[stuck][:, self._is_limit] < SIX_CABLES_UNDECIDED).any(1)
         is_near &= (proof.attained[stuck][:, ~self._is_limit] > SIX_CABLES_UNDECIDED).all(1)
         if is_near.any():
@@ -148,13 +148,13 @@ class Certifier:
     def _bounds_in_orders(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
         bounds = self.bounds(0, blocks, motions, margins=margins, reduced=not margins)
         for k in range(1, len(self._orders)):
-            # These blocks stay open because the first three cables lie nearly in one plane.
+            # These blocks are still open because the first three cables lie nearly in one plane.
             open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > SIX_CABLES_UNDECIDED).all(0))
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, reduced=not margins)
-            # Replace the values at nodes too: where these cables lie in one plane the values are rounding, and could
-            # refute.
+            # Replace the values at nodes as well: if these cables lie in one plane, the values are rounding errors,
+            # which could refute.
             surer = better.rounding < bounds.rounding[open_ones]
             bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
             bounds.offset[open_ones[surer]] = better.offset[surer]
@@ -170,7 +170,7 @@ class Certifier:
         return in_batches(kernel, items, batch_size=self._batch, axis=-1)
 
     def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
-        # Return the robot with its cables in an order, and its blocks as kernels take them.
+        # Return the robot with its cables in a given order, and its blocks in the form for kernels.
         segments, arcs, at_rest = motions
         problem, sign, _ = self._orders[order]
         self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
@@ -191,7 +191,7 @@ class Certifier:
             bounds = in_batches(kernel, items, batch_size=self._batch, axis=-1)
             index = np.ix_(remaining, np.array(order.cables))
             low[index], high[index] = np.fmax(low[index], bounds.low.T), np.fmin(high[index], bounds.high.T)
-            # Go on, as in `_bounds_in_orders`, with blocks in which the first three cables lie nearly in one plane.
+            # As in `_bounds_in_orders`, continue with blocks in which the first three cables lie nearly in one plane.
             remaining = remaining[_rounding_matters(bounds)]
             if not len(remaining):
                 break
@@ -199,14 +199,14 @@ class Certifier:
 
 
 def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
-    # Tell where rounding matters: elsewhere another order of the cables gives no better bounds, only shorter blocks do.
+    # Tell where rounding matters: elsewhere only shorter blocks give better bounds, not another order of the cables.
     rounding, allowed = np.asarray(bounds.rounding), np.asarray(bounds.allowed)
     return (rounding > 0.25 * SIX_CABLES_UNDECIDED) & (rounding >= MATTERS * allowed)
 
 
 def _orders(problem: Problem) -> list[_Order]:
     # The robot's own order comes first, then the orders whose first, third and fifth ray span the largest volumes at
-    # rest, a unit below the spools.
+    # rest, at unit depth below the spools.
     robot = problem.robot
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     rays = arms + np.array([0.0, 0.0, float(np.abs(base).max())]) - base
@@ -226,7 +226,7 @@ def _sign(order: list[int]) -> float:
 
 
 def _reordered(problem: Problem, order: list[int]) -> Problem:
-    # Share no joints between cables, so that one compiled function serves every order.
+    # Let no cables share joints, so that one compiled function serves every order.
     robot, limits = problem.robot, problem.limits
     points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
     changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
@@ -241,7 +241,7 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
 
 
 def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> Float[np.ndarray, "n"]:
-    """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it."""
+    """Determinant of the Jacobian J (3.5) at rest in P0, with the sign of `wrench_lanes.balance`."""
     robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.center)[:, 2], return_inverse=True)
     arms = np.asarray(robot.platform_points)
     forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]

@@ -1,4 +1,4 @@
-"""Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
+"""Work list of a proof: blocks of motions are halved until each is proved, or until its motion is refuted."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.verification.bounds.blocks import Blocks
 
-# Slacks of limits that are nearer to zero than this are undecided, if they are bounded in double precision.
+# Slacks of limits closer to zero than this are undecided if they are bounded in double precision.
 LIMITS_UNDECIDED = 1e-12
-HALVINGS = 21  # of a block, at most
-OPEN = 64  # blocks of an arc that may be open
+HALVINGS = 21  # largest number of halvings of a block
+OPEN = 64  # largest number of open blocks of an arc
 # Factor of `OPEN` for motions that break no criterion by more than the undecided range.
 TOUCHING = 64
-# How many times blocks are halved at once: in the first round, in the second, and in all later ones, where few blocks
-# are open and a batch of them costs as much as a full one.
+# Number of times that blocks are halved at once: in the first, in the second, and in all later rounds. In later rounds
+# few blocks are open, and a batch of them costs as much as a full one.
 AT_ONCE = (1, 2, 3)
 
 
@@ -30,10 +30,10 @@ class BlockBounds(NamedTuple):
     """Bounds and attained values of k blocks.
 
     Fields:
-        nodes: (m, n_criteria or more, k) values at times: slacks first.
+        nodes: (m, n_criteria or more, k) values at times, slacks first.
         bound: (n_criteria, k) proved lower bounds of the slacks.
-        tau: (m, k) the times.
-        is_enough: takes the smallest values so far, (n, n_criteria or more), and gives which blocks need not be halved
+        tau: (m, k) times of the values.
+        is_enough: function of the smallest values so far, (n, n_criteria or more); tells which blocks need no halving
             once their slacks are proved, (k,).
     """
 
@@ -48,16 +48,16 @@ class WorkList:
 
     Args:
         arcs: (n,) numbers of arcs.
-        near: (n_criteria,) distance from zero within which slacks are undecided.
-        ignored: (n_criteria,) mask of criteria that neither refute nor need be proved; None: all count.
+        near: (n_criteria,) slacks closer to zero than this are undecided.
+        ignored: (n_criteria,) mask of criteria that neither refute a motion nor need a proof; None: there are none.
 
     Fields:
-        is_refuted: (n,) motions of which a sample breaks a criterion, or for which `refute` was called.
+        is_refuted: (n,) motions that break a criterion at a sample, or for which `refute` was called.
         is_stuck: (n,) motions that stay undecided.
         attained: (n, n_criteria or more) smallest values at the samples.
-        bound: (n, n_criteria) proved lower bounds; NaN of motions that are refuted or stuck.
-        refuted_tau: (n,) tau at which a criterion is broken by most, else tau at which something else refutes the
-            motion; NaN where nothing does.
+        bound: (n, n_criteria) proved lower bounds; NaN for motions that are refuted or stuck.
+        refuted_tau: (n,) tau at which a criterion is violated most, else tau at which something else refutes the
+            motion; NaN if nothing does.
     """
 
     def __init__(self, arcs: np.ndarray, near: np.ndarray, ignored: np.ndarray | None = None) -> None:
@@ -69,13 +69,13 @@ class WorkList:
         self.attained, self._worst = np.zeros((len(arcs), 0)), np.zeros(len(arcs))
 
     def run(self, blocks: Blocks, bounds_of: Callable[[Blocks, int], BlockBounds]) -> BlockBounds:
-        """Bound blocks, and the halves of blocks that stay open."""
+        """Bound blocks and the halves of open ones; return bounds of the first blocks."""
         first = bounds = bounds_of(blocks, 0)
         self.attained = np.full((len(self._arcs), bounds.nodes.shape[1]), np.inf)
         halved = 0
         for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
             is_open = self._apply(blocks, bounds, last=halved >= HALVINGS)
-            # If a limit is touched all along a path, as on level ones along the floor, blocks stay open for long.
+            # If a limit is touched along a full path, as on level ones along the floor, many blocks stay open.
             fraction = np.where((bounds.bound > -SIX_CABLES_UNDECIDED).all(0), 1.0 / TOUCHING, 1.0)
             self.is_stuck |= np.bincount(blocks.row, fraction * is_open, len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
@@ -90,22 +90,22 @@ class WorkList:
         return first
 
     def refute(self, motion: Float[np.ndarray, "k"], tau: Float[np.ndarray, "k"]) -> None:
-        """Note motions that are refuted by something else than criteria."""
+        """Record motions that something else than criteria refutes."""
         self.is_refuted[motion] = True
         is_new = np.isnan(self.refuted_tau[motion])
         self.refuted_tau[motion[is_new]] = tau[is_new]
 
     def _apply(self, blocks: Blocks, bounds: BlockBounds, *, last: bool) -> np.ndarray:
-        # Apply the bounds of blocks; return the mask of blocks to be halved.
+        # Apply the bounds of blocks; return the mask of blocks to halve.
         minimum, low = bounds.nodes.min(0).T, bounds.bound.T
         _lower(self.attained, blocks.row, minimum)
         slack = minimum[:, : low.shape[1]]
-        # NaN refutes nothing, and proves nothing.
+        # NaN neither refutes nor proves anything.
         self._note_samples(blocks, bounds)
         self.is_refuted[blocks.row[(slack < -self._near).any(1)]] = True
         is_above = (low > self._near) | self._ignored
         is_proved = is_above.all(1) & bounds.is_enough(self.attained)
-        with np.errstate(invalid="ignore"):  # infinities: singular poses, blocks without a bound
+        with np.errstate(invalid="ignore"):  # singular poses and blocks without a bound are infinite
             is_exact = ((slack - low <= 0.5 * self._near) & ~is_above).any(1)
         is_done = is_proved | is_exact | last | np.isnan(minimum).any(1)
         self.is_stuck[blocks.row[is_done & ~is_proved]] = True
@@ -117,12 +117,12 @@ class WorkList:
         node = worst.argmin(0)
         value, tau = worst[node, np.arange(len(node))], bounds.tau[node, np.arange(len(node))]
         breaks = np.flatnonzero(value < self._worst[blocks.row])
-        breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # the worst of a motion is written last
+        breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # written last: the worst value of a motion
         self._worst[blocks.row[breaks]], self.refuted_tau[blocks.row[breaks]] = value[breaks], tau[breaks]
 
 
 def _lower(values: np.ndarray, motion: np.ndarray, others: np.ndarray) -> None:
-    # Lower the smallest values to those of others, of which equal motions stand side by side.
+    # Lower the smallest values of motions; values of the same motion are adjacent.
     if len(motion):
         first = np.flatnonzero(np.diff(motion, prepend=-1))
         values[motion[first]] = np.minimum(values[motion[first]], np.minimum.reduceat(others, first))
@@ -131,7 +131,7 @@ def _lower(values: np.ndarray, motion: np.ndarray, others: np.ndarray) -> None:
 def smallest_nodes(
     nodes: Sequence[Array], n_slacks: int, offsets: Float[np.ndarray, "m"]
 ) -> tuple[Float[Array, "1 n_criteria n"], Float[Array, "n"]]:
-    """Reduce the node values of n blocks to the few numbers that a verdict needs; slacks are the first of them."""
+    """Reduce the node values of n blocks to the few numbers that a verdict needs; slacks come first."""
     worst = smallest(list(nodes[:n_slacks]))
     is_there = worst == jnp.min(worst, axis=0)[None]
     first = jnp.min(jnp.where(is_there, offsets[:, None], jnp.inf), axis=0)

@@ -1,14 +1,14 @@
-"""Proof of swings, fast: screens refute most, blocks with bounds of slacks prove the rest.
+"""Fast proof of swings: screens refute most motions, blocks with bounds of slacks prove the others.
 
 Files, each importing only from those above it:
 
     slacks         taut cables and depth, with bounds of their second derivatives
     limit_slacks   slacks of limits, likewise
     criteria       all criteria in one order
-    blocks         cuts of a segment at the knots of its amplitude function
-    enclosures     bounds of the state over a block of time, for robots that differ a little
-    verdicts       verdicts that hold between the samples
+    blocks         blocks of a segment between the knots of its amplitude function
+    enclosures     bounds of the state over a block of time, for slightly different robots
+    verdicts       verdicts that also hold between samples
     margins        smallest slacks, refined
-    screen         upper bounds of the margins of all numbers of arcs at once
-    limit_screen   candidates that a few samples refute by a limit
+    screen         upper bounds of the margins for all numbers of arcs together
+    limit_screen   candidates that a limit at a few samples refutes
 """

@@ -1,4 +1,4 @@
-"""Blocks of a segment for a first pass: cuts between the knots of the amplitude function."""
+"""Blocks of a segment for a first pass; knots of the amplitude function are ends of blocks."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from jax import Array, lax
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.shapes import Float, Int, Num
 
-# Intervals between the samples of one block.
+# Number of intervals between the samples of one block.
 INTERVALS = 16
-# Rows and columns of the table are multiples of this, so that most calls have one shape.
+# Rows and columns of the table are padded to multiples of this, so that most calls have one shape.
 STEP = 32
 
 
 def blocks(
     amplitude: Amplitude, max_arcs: int, *, density: int = 1, minimum: int = 1
 ) -> tuple[Num[np.ndarray, "n_rows n_edges"], Int[np.ndarray, "n_rows"]]:
-    """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot."""
+    """Edges of about density (p + 4) blocks for each number of arcs p; no block contains a knot."""
     pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
     n_rows = _rounded(max_arcs + 1)
     rows = []

@@ -1,4 +1,4 @@
-"""All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
+"""All criteria of a segment in one order: taut cables, depth below the spools, then the given limits."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
 
-# Criteria that are no limits: taut cables, and the depth below the spools.
+# Number of criteria that are no limits: taut cables, and the depth below the spools.
 BASIC = 2
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
-    """The flag that says that a criterion is broken, for each criterion."""
+    """Flag of each criterion, raised if it is broken."""
     return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
 def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
-    """Numbers of smooth functions of which each criterion is the smallest."""
+    """Number of smooth functions whose minimum each criterion is."""
     return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in limits_set(limits)))
 
 
@@ -41,7 +41,7 @@ def smooth_slacks(
     arcs: Num[Array, ""],
     tau: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
-    """Every slack of every criterion, at one time: smooth functions of tau."""
+    """All slacks of all criteria at one time, which are smooth functions of tau."""
     state = swing_state(segment, amplitude, arcs, tau)
     terms = [*state.kappa, state.eta]
     for slack in limit_slacks(robot, limits, segment, arcs, tau, state):
@@ -57,7 +57,7 @@ def slacks(
     arcs: Num[Array, ""],
     tau: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
-    """The smallest slack of each criterion, at one time."""
+    """Smallest slack of each criterion at one time."""
     values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
     return tuple(smallest(list(itertools.islice(values, n))) for n in counts(robot, limits))
 
@@ -71,7 +71,7 @@ def curvatures(
     start: Float[Array, ""],
     stop: Float[Array, ""],
 ) -> tuple[Float[Array, ""], ...]:
-    """Bound of the second derivative of each criterion's slacks over an interval."""
+    """Bound of the second derivatives of each criterion's slacks over an interval."""
     over = interval_bounds(segment, amplitude, arcs, start, stop)
     kappa = each_taut_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)

@@ -1,4 +1,4 @@
-"""Enclosures of a point mass in motion, for bounds over robots that differ a little."""
+"""Enclosures of a point mass in motion, for bounds over slightly different robots."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates,
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
-PARTS = 4  # blocks of an arc to begin with
-BATCH = 1024  # blocks computed at a time
+PARTS = 4  # number of blocks of an arc at first
+BATCH = 1024  # number of blocks computed at a time
 
 
 class _BlockValues(NamedTuple):
-    # Values of one block: the first three in its middle, then bounds within it.
+    # Values of one block: the first three are in the middle, the others bounds within the block.
     rays: Array
     velocity: Array
     acceleration: Array
@@ -56,7 +56,7 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
     scale = segment.rate / robot.base_points.shape[0]
 
     def fraction(top, is_low):
-        # Bound tensions where eta is positive; a lower bound below zero is divided by the smallest eta.
+        # Bound tensions where eta is positive; divide a negative lower bound by the smallest eta.
         bottom = jnp.where((top > 0.0) == is_low, eta[1], eta[0])
         return jnp.where(eta[0] > 0.0, scale * top / bottom, jnp.where(is_low, -jnp.inf, jnp.inf))
 

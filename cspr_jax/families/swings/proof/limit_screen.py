@@ -1,7 +1,7 @@
-"""A second screen, of limits: a few samples refute most numbers of arcs that break a limit by far.
+"""Second screen, for limits: a few samples refute most numbers of arcs that clearly break a limit.
 
-It takes candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a
-limit by more than rounding is a refutation; nothing is accepted here.
+It screens candidates only when the search comes to them, as many at a time as a batch holds. A sample that breaks a
+limit by more than rounding refutes a candidate; the screen accepts none.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from cspr_jax.numerics.shapes import Bool, Int, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 SAMPLES = 32
-# Tolerances by which a sample must lie below zero: twice as far as where `families.swings.proof.verdicts` refutes a
-# limit.
+# A sample refutes a candidate if its slack is below minus this multiple of the tolerance with which
+# `families.swings.proof.verdicts` refutes a limit.
 FAR = 2.0
 
 
 class LimitScreen:
-    """Candidates of n segments: which are left, and the limits that samples show each to break.
+    """Candidates of n segments: which ones remain, and the limits that each breaks at samples.
 
     Args:
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
-        alive: (n, max_arcs) candidates, column p - 1 for p arcs.
+        alive: (n, max_arcs) mask of candidates, column p - 1 for p arcs.
 
     Attributes:
         alive: (n, max_arcs) candidates that are not refuted.
@@ -43,14 +43,14 @@ class LimitScreen:
     """
 
     def __init__(self, problem: Problem, parities: dict[int, Segment], alive: np.ndarray) -> None:
-        """No candidate is screened yet."""
+        """Start without any candidate screened."""
         n_limits = len(limits_set(problem.limits))
         self._problem, self._parities = problem, parities
         self._unseen = alive.copy() if n_limits else np.zeros_like(alive)
         self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
 
     def screened(self, rows: Int[np.ndarray, "m"]) -> Int[np.ndarray, "k"]:
-        """Screen candidates until the first one left of each segment has passed; return the segments that have one."""
+        """Screen until the first remaining candidate of each segment has passed; return the segments that have one."""
         while True:
             rows = rows[self.alive[rows].any(1)]
             open_rows = rows[self._unseen[rows, np.argmax(self.alive[rows], axis=1)]]
@@ -68,7 +68,7 @@ class LimitScreen:
 def broken_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
 ) -> Bool[np.ndarray, "n n_criteria"]:
-    """Limits that some sample breaks by more than rounding; a quick refutation."""
+    """Limits that some sample breaks by more than rounding."""
     lowest, near = in_batches(
         partial(_lowest, touchable(problem)), (segments, np.asarray(arcs, float)), batch_size=BATCH
     )
@@ -78,7 +78,7 @@ def broken_at_samples(
 def upcoming(
     candidates: Bool[np.ndarray, "n max_arcs"], rows: Int[np.ndarray, "m"]
 ) -> tuple[Num[np.ndarray, "k"], Num[np.ndarray, "k"]]:
-    """Next candidates of segments: one each, or as many as fill a batch, which takes no longer when it is full."""
+    """Next candidates of segments: one each, or until a batch is full, which takes no longer."""
     left = candidates[rows]
     owner, column = np.nonzero(left & (np.cumsum(left, axis=1) <= max(BATCH // len(rows), 1)))
     return rows[owner], column + 1

@@ -1,7 +1,7 @@
-"""Limits of tension, height, cable length, of speeds and accelerations of cables and mass centre, as slacks.
+"""Slacks of limits of tension, height, cable length, and of speeds and accelerations of cables and mass centre.
 
-In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over
-the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is kappa_k rho_k / (m z0 eta).
+In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over the weight,
+derivatives with respect to tau, and w_k = (p - a_k) . p', F of cable k is kappa_k rho_k / (m z0 eta).
 
     tension        kappa_k rho_k / (m z0) - F_min eta,   F_max eta - kappa_k rho_k / (m z0)
     floor          (floor - z) / z0
@@ -10,7 +10,7 @@ the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is
     acceleration   (a_max T^2 rho_k^3 -+ (rho_k^2 w_k' - w_k^2)) / (a_max T^2 z0^3)
     mass centre    1 - (|p'| / (T v_max))^2,   1 - (|p''| / (T^2 a_max))^2
 
-Each is dimensionless and free of a division that could blow up.
+Each slack is dimensionless, and no division in it can overflow.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from cspr_jax.schema.limits import Limit
 
 
 class _CableState(NamedTuple):
-    # A segment and one of its cables at one time, numbers; derivatives in tau. XLA makes one loop of numbers.
+    # A segment and one of its cables at one time; derivatives in tau. These are scalars, from which XLA makes one loop.
     z0: Array
     time: Array
     weight: Array
@@ -51,7 +51,7 @@ class _CableState(NamedTuple):
 
 
 class _OverInterval(NamedTuple):
-    # Bounds over an interval, of one cable; `square` bounds (rho^2)'' without the division that is in `length`.
+    # Bounds for one cable over an interval; `square` bounds (rho^2)'' without the division in `length`.
     n_cables: int
     z0: Array
     time: Array
@@ -66,8 +66,8 @@ class _OverInterval(NamedTuple):
 
 
 class _Closed(NamedTuple):
-    # Closed form of a limit: its slack, the bound of its second derivative, and how many slacks each cable has (two:
-    # the slack is a pair).
+    # Closed form of a limit: its slack, the bound of the second derivative, and the number of slacks of each cable (2
+    # if the slack is a pair).
     slack: Callable[[_CableState, Array], Any]
     curvature: Callable[[_OverInterval, Array], Array]
     sides: int = 1
@@ -138,7 +138,7 @@ CLOSED = {
 
 
 def count(row: Limit, n_cables: int) -> int:
-    """Number of smooth functions of which the slack of a limit is the smallest."""
+    """Number of smooth functions whose minimum is the slack of a limit."""
     return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
 
@@ -151,7 +151,7 @@ def limit_slacks(
     tau: Float[Array, ""],
     state: SwingState,
 ) -> tuple[list[Array], ...]:
-    """The slacks of each limit, at one time: smooth functions, one or two for each cable."""
+    """Slacks of each limit at one time: smooth functions, one or two for each cable."""
     if not limits_set(limits):
         return ()
     position, velocity, acceleration = _path(segment, arcs, tau, state)
@@ -192,7 +192,7 @@ def _path(segment: Segment, arcs: Array, tau: Array, state: SwingState) -> tuple
 
 
 def _in_space(segment: Segment, vector: Sequence[Array] | Array, origin: Sequence[Any] | Array = (0, 0, 0)) -> Vector:
-    # From the plane of the trajectory; without a product of matrices, beside which XLA makes loops of their own.
+    # Convert from the plane of the trajectory; without a matrix product, for which XLA makes a loop of its own.
     plane = segment.plane
     return [origin[i] + plane[i, 0] * vector[0] + plane[i, 1] * vector[1] for i in range(3)]
 
@@ -269,10 +269,10 @@ def _distances(robot: PointMassRobot, position: Vector | Array) -> list[Array]:
 def least_lengths(
     robot: PointMassRobot, segment: Segment, over: IntervalBounds, position: Bounds, eta: Bounds
 ) -> list[Array]:
-    """Lower bounds of the lengths of the cables over an interval.
+    """Lower bounds of the cable lengths over an interval.
 
-    No cable is shorter than the distance from the spool plane. Where the mass moves far within the interval, its
-    greatest distance from P0 and its least depth say more than its length and depth in the middle.
+    No cable is shorter than the distance from the spool plane. If the mass moves far within the interval, its largest
+    distance from P0 and its smallest depth give better bounds than its length and depth in the middle.
     """
     tilt = segment.tilt[0] * over.position[0] + segment.tilt[1] * over.position[1]
     lowest = jnp.maximum(tilt - over.radius * eta.derivative, -eta.value)
@@ -282,7 +282,7 @@ def least_lengths(
 
 
 def _rate(length: Bounds, position: Bounds, acceleration: Bounds) -> Bounds:
-    # w = ray . p'
+    # Here w = ray . p'.
     return Bounds(
         length.value * position.derivative,
         position.derivative**2 + length.value * position.curvature,
@@ -291,7 +291,7 @@ def _rate(length: Bounds, position: Bounds, acceleration: Bounds) -> Bounds:
 
 
 def _acceleration_bounds(length: Bounds, position: Bounds, acceleration: Bounds, square: Array) -> Bounds:
-    # rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
+    # Bound rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
     rate = _rate(length, position, acceleration)
     last = (
         3.0 * position.curvature**2

@@ -1,7 +1,7 @@
-"""The smallest value along a segment of functions of time, refined between the samples.
+"""Smallest values of functions of time along a segment, refined between the samples.
 
-Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
-three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
+Every block is sampled, and a parabola at its smallest sample estimates the minimum. The best three
+estimates of a group of functions over all blocks are then refined by ever narrower parabolas.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 CANDIDATES = 3
-# The last 16 bits of an estimate hold its time, to 1/4096 of the distance of samples; no estimate is larger than this.
+# The last 16 bits of an estimate store its time, to 1/4096 of the distance of samples; estimates are capped.
 LAST_BITS = 2**16 - 1
 LARGEST = 1e300
-# Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
+# Point distance of the first refining parabola, in steps between samples, and the factor for each next one.
 FIRST_WIDTH = 1.0 / 4.0
 NARROWER = 1.0 / 6.0
 ROUNDS = 7
 
 
 def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array):
-    # For each function: an estimate of its minimum in one block of each segment, and where; (n_functions, n) each.
+    # Return for each function an estimate of its minimum in one block of each segment, and its time; (n_functions, n).
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     sampled = partial(jax.vmap(jax.vmap(partial(function, *problem)), in_axes=(None, None, 0)), segments, arcs)
-    # A parabola through every three neighbours: the lowest sample may belong to the valley of another block. XLA would
-    # compute parts of computed arrays anew each time, with all that several functions share.
+    # Lay a parabola through every three neighbours: the lowest sample may belong to the valley of another block. From
+    # arrays XLA would recompute everything that several functions share.
     each = map(vertex, sampled(tau[:-2]), sampled(tau[1:-1]), sampled(tau[2:]))
     marked = smallest_of_each([_marked(estimate, weight[1:-1] + move / INTERVALS) for move, estimate in each])
     estimates, fractions = _unmarked(jnp.stack(marked))
@@ -50,8 +50,8 @@ def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array,
 
 
 def _marked(estimates: Array, fractions: Array) -> Array:
-    # Write a number from 0 to 1 into the last bits of another one: the smallest of such numbers says where it lies. XLA
-    # computes an argmin one number at a time, and several minima in one loop only if nothing else is found.
+    # Store a time from 0 to 1 in the last bits of an estimate, so that the smallest estimate tells its time. XLA
+    # computes an argmin one number at a time, and several minima in one loop only if nothing else is computed.
     numbers = jnp.where(estimates < LARGEST, estimates, LARGEST)  # neither is NaN
     bits = jnp.round(fractions * LAST_BITS).astype(jnp.int64)
     return lax.bitcast_convert_type(lax.bitcast_convert_type(numbers, jnp.int64) & ~LAST_BITS | bits, jnp.float64)
@@ -63,8 +63,8 @@ def _unmarked(marked: Array) -> tuple[Array, Array]:
 
 
 def _insert(best: tuple[Array, Array], estimate: Array, at: Array) -> tuple[Array, Array]:
-    # Insert a candidate so that all stay in order; leaves (CANDIDATES, n_values, n). Segments with fewer blocks than
-    # others repeat their last block: a time that is among the candidates is not inserted again.
+    # Insert a candidate, keeping the order; leaves (CANDIDATES, n_values, n). Segments with fewer blocks than others
+    # repeat their last block: a time among the candidates is not inserted again.
     estimate = jnp.where((best[1] == at[None]).any(0), jnp.inf, estimate)
     estimates, times = [], []
     for old_estimate, old_at in zip(*best, strict=True):
@@ -83,13 +83,13 @@ def refined_minimum(
 ) -> Float[Array, ""]:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
-    A parabola is believed only where its middle is the lowest of its three points; else the points move to the lowest.
-    So a minimum that is steep on one side, or a kink beside it, is found too.
+    A parabola is used only if its middle point is the lowest of the three; else the points move to the lowest. So
+    minima that are steep on one side, or next to a kink, are found as well.
     """
 
     def narrow(i, state):
         smallest, at, width = state
-        middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
+        middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points within the motion
         points = jnp.stack([middle_point - width, middle_point, middle_point + width])
         left, middle, right = materialized(jax.vmap(function)(points), one)
         bracketed = (middle <= left) & (middle <= right)
@@ -100,16 +100,16 @@ def refined_minimum(
         return jnp.minimum(smallest, jnp.minimum(middle, jnp.minimum(left, right))), at, width
 
     first = (jnp.full_like(tau, jnp.inf), tau, step * FIRST_WIDTH)
-    # The last round evaluates where the one before ended.
+    # The last round evaluates the function where the previous one ended.
     return lax.fori_loop(0, ROUNDS, narrow, first)[0]
 
 
 class Functions(NamedTuple):
-    """Smooth functions of time in groups, each with one smallest value to be found.
+    """Smooth functions of time in groups; the smallest value of each group is searched for.
 
     Fields:
-        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.
-        groups: how many functions each group has.
+        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> values (), group by group; hashable.
+        groups: number of functions in each group.
     """
 
     evaluate: Callable
@@ -117,7 +117,7 @@ class Functions(NamedTuple):
 
 
 def _best_of_groups(groups: tuple[int, ...], estimates: Array, times: Array) -> tuple[Array, Array]:
-    # Choose the best candidates of each group, whatever function they are of: the number of the function, and where;
+    # Choose the best candidates of each group, among all of its functions: index of the function, and time,
     # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
     functions, taus, first = [], [], 0
     for n in groups:
@@ -137,7 +137,7 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, times: Array) -> 
 
 
 def _chosen(values: Sequence[Array], number: Array) -> Array:
-    # One of some numbers. Of an array of them, XLA would compute what they share for each of them anew.
+    # Select one of several numbers. From an array XLA would recompute what they share for each of them.
     chosen = values[0]
     for i, value in enumerate(values[1:], 1):
         chosen = jnp.where(number == i, value, chosen)
@@ -159,7 +159,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
 
     def refine(segment, p, number, where, width):
-        # number, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
+        # Shapes are (n_groups, CANDIDATES). One copy of the function serves all, which compiles much faster.
         def minimum(number, tau):
             return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width, one)
 
@@ -171,7 +171,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
 def smallest_values(
     functions: Functions, problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], table
 ) -> Float[np.ndarray, "n n_groups"]:
-    """Smallest values along each segment of functions of time."""
+    """Smallest values of functions of time along each segment."""
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
@@ -183,9 +183,9 @@ def smallest_values(
 def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
     """Smallest slack of each criterion along each segment.
 
-    The smallest sample of every block is refined, so the value does not depend on where the samples lie. For many
-    segments with limits, where all slacks are positive, the smaller one of the cables' and the depth's stands in the
-    first two columns, and the smallest one of the limits in the others: refining two numbers takes less time.
+    The smallest sample of every block is refined, so the value does not depend on the times of samples. For many
+    segments with limits, if all slacks are positive, the first two columns both hold the smaller slack of cables and
+    depth, and all others the smallest slack of limits: refining two numbers takes less time.
     """
     groups = counts(problem.robot, problem.limits)
     if len(groups) == BASIC or len(arcs) <= SMALL:
@@ -202,10 +202,10 @@ def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> 
 
 
 def each_margin(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
-    """Smallest slack of each criterion along each segment, each refined by itself, as `margins` may not do."""
-    # The smallest over the cables has kinks, each cable's own slack has none.
+    """Smallest slack of each criterion along each segment, each refined by itself, unlike in `margins`."""
+    # The minimum over cables has kinks, the slack of each cable has none.
     table = blocks(problem.amplitude, int(np.max(arcs)))
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)
-    # A compiled minimum may ignore NaN; a function that is not finite everywhere has no minimum.
+    # A compiled minimum may ignore NaN: a function that is not finite everywhere has no minimum.
     return np.where(np.isfinite(smallest), smallest, np.nan)

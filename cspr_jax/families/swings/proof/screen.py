@@ -1,12 +1,12 @@
-"""A first screen of all numbers of arcs at once: upper bounds of the margin, fast.
+"""First screen, for all numbers of arcs together: upper bounds of the margin, fast.
 
-The closed form splits a pseudotension into what depends on the points and what depends only on the
-number of arcs and tau. The second is a table; the precession is the same for all numbers of arcs of
-one parity. What is left of a check is some fifty multiplications and additions without a division.
-A fusion runs over the segments of a batch and takes several samples at a time, so that a segment's
-own numbers stay in registers and no array of segments by samples is made but the precession.
+The closed form splits a pseudotension into factors that depend on the points, and factors that depend only on
+the number of arcs and tau. The latter are in a table; the precession is the same for all numbers of arcs of one
+parity. A check then takes some fifty multiplications and additions, and no division. A fused loop runs over the
+segments of a batch and takes several samples at a time, so that the numbers of a segment stay in registers and
+the only array of segments by samples is the precession.
 
-The screen rejects candidates; it accepts none. `families.swings.proof.verdicts` decides about the rest.
+The screen only rejects candidates; `families.swings.proof.verdicts` decides the remaining ones.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 SAMPLES = 32
 BATCH = 2048
-# Samples in one pass over the batch; measured.
+# Number of samples in one pass over the batch; the fastest as measured.
 UNROLL = 4
-# Below this T^2 lambda a segment has no duration (p = 1, psi -> 0) and is no trajectory.
+# With T^2 lambda below this, a segment has no duration (p = 1, psi -> 0) and is no trajectory.
 SMALLEST_PERIOD = 1e-9
-# Units of rounding of the largest term by which a sampled value is raised to be an upper bound.
+# A sampled value is raised by this many rounding units of the largest term, to be an upper bound.
 EPSILONS = 256.0
 
 
 def sample_table(
     amplitude: Amplitude, arcs: Num[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"], dtype
 ) -> Float[Array, "n_arcs 6 n_samples"]:
-    """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A."""
+    """Table of the factors of a check that do not depend on the points, but on the phase pi p tau and on A."""
     phase = math.pi * arcs[:, None] * tau
     cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
     value, rate, second_derivative = (
@@ -54,11 +54,11 @@ def sample_table(
 def smallest_sampled(
     amplitude: Amplitude, segments: Segment, arcs: Int[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
 ) -> Float[Array, "n_arcs n"]:
-    """Smallest normalised pseudotension, or depth ratio, over samples, for some numbers of arcs of one parity."""
+    """Smallest normalised pseudotension or depth ratio over samples, for some numbers of arcs of one parity."""
     dtype = segments.rate.dtype
     start, span = segments.start_radius, segments.end_radius - segments.start_radius
     laterals, axials = sincospi(jnp.asarray(tau, dtype)[:, None] * segments.precession[None, :])
-    # The sense of the rotation mirrors the second axis; after that every quantity is that of sense +1.
+    # Mirror the second axis for the sense -1: then all formulas are those of the sense +1.
     mirror = jnp.stack([jnp.ones_like(span), segments.sense], axis=-1)
     tilt = tuple((segments.tilt * mirror).T)
     rows = [(*(segments.coupling[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
@@ -79,8 +79,8 @@ def smallest_sampled(
             cross = c_r * d_t - c_t * d_r
             eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
             couplings = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
-            # kappa_k = eta + coupling_k; eta itself is the depth ratio
-            # A NaN may be forgotten, which leaves an upper bound: `families.swings.proof.verdicts` decides.
+            # kappa_k is eta + coupling_k, and eta itself the depth ratio.
+            # NaN may be ignored: the result is still an upper bound, and `families.swings.proof.verdicts` decides.
             lowest = nan_ignoring_min(
                 nan_ignoring_min(couplings[0], couplings[1]), nan_ignoring_min(couplings[2], jnp.zeros_like(eta))
             )
@@ -92,8 +92,8 @@ def smallest_sampled(
                 smallest = check(UNROLL * j + i, smallest)
             return smallest
 
-        # The minimum is not carried from one sample to the next: XLA leaves on one core what a loop stacks, as the
-        # threads of the caller need it.
+        # Do not carry the minimum from sample to sample: loops that stack results run on one core, as the caller's
+        # threads need.
         smallest = row_by_row(chunk, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 
@@ -104,7 +104,7 @@ def smallest_sampled(
 def upper_bounds(
     amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int, samples: int = SAMPLES
 ) -> Num[Array, "n max_arcs"]:
-    """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for."""
+    """Upper bounds of the margin of segments for every number of arcs, with an allowance for rounding."""
     tau = (np.arange(samples) + 0.5) / samples
     numbers = np.arange(1, max_arcs + 1)
     dtype = even.rate.dtype

@@ -1,13 +1,13 @@
-"""Criteria of a segment as slacks: numbers that are positive exactly while a criterion is met.
+"""Criteria of a segment as slacks: a slack is positive exactly if its criterion is met.
 
-At one time, with kappa_k the normalised pseudotension of cable k (1 at rest in p0) and eta the
-depth below the spools over z0, both along the vertical:
+At one time, with kappa_k the normalised pseudotension of cable k (1 at rest in p0), and eta the vertical
+depth below the spools over z0:
 
     taut               kappa_k        thesis (2.12) to (2.14)
     below the spools   eta
 
-`limit_slacks` adds the slacks of the limits that are set. Beside each slack stands a bound of its second
-derivative over an interval, from the closed form: it is what makes a verdict hold between samples.
+`limit_slacks` adds the slacks of the given limits. For each slack there is a bound of its second derivative
+over an interval, from the closed form, so that verdicts also hold between samples.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class SwingState(NamedTuple):
     """State of a segment at one time.
 
     Fields:
-        kappa: normalised pseudotensions, one () a cable.
+        kappa: normalised pseudotensions, one () for each cable.
         eta: () depth below the spools over z0.
         c: (2,) position in the plane of the trajectory, m.
         d: (2,) c + c'' / lambda, m.
@@ -45,7 +45,7 @@ class SwingState(NamedTuple):
 
 
 def swing_state(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]) -> SwingState:
-    """State of a segment at one time, by the closed form."""
+    """State of a segment at one time, by closed form."""
     values = derivatives(amplitude, tau, order=2)
     c, d = swing(segment, values, arcs, tau)
     cross = c[0] * d[1] - c[1] * d[0]
@@ -58,12 +58,12 @@ def swing_state(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], ta
 def normalised_pseudotensions(
     segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
 ) -> Float[Array, "n_cables"]:
-    """Pseudotensions over their value at rest in p0, by the closed form, at one time."""
+    """Pseudotensions over their value at rest in p0 at one time, by closed form."""
     return jnp.stack(swing_state(segment, amplitude, arcs, tau).kappa)
 
 
 def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
-    """Bound of the sum of the magnitudes of all terms of a normalised pseudotension: the scale of its rounding."""
+    """Bound of the sum of magnitudes of all terms of a normalised pseudotension, which scales its rounding errors."""
     ratio, steady, period = oscillation(segment, arcs)
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
@@ -78,12 +78,12 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -
 
 
 class IntervalBounds(NamedTuple):
-    """An interval of tau in which no knot of the amplitude function lies inside, with bounds over it.
+    """An interval of tau without a knot of the amplitude function inside, with bounds over it.
 
     Fields:
-        middle: () of the interval.
-        radius: () half of its width.
-        swing_radius: bounds of r, as Bounds.
+        middle: () middle of the interval.
+        radius: () half the width of the interval.
+        swing_radius: bounds of r.
         radial_rate: bounds of r'.
         second_derivative: bounds of r''.
         position: (2,) position c in the middle, m.
@@ -112,7 +112,7 @@ def interval_bounds(
 
 
 def _components(segment: Segment, vector: Array, over: IntervalBounds) -> tuple[Bounds, Bounds]:
-    # Bound vector . e_r and vector . e_t, which rotate into each other at the rate of the precession.
+    # Bound vector . e_r and vector . e_t, which precession rotates into each other.
     lateral, axial = sincospi(segment.sense * segment.precession * over.middle)
     length = hypotenuse(vector[0], vector[1])
     rate = math.pi * segment.precession
@@ -136,8 +136,8 @@ def row_bounds(
 ) -> Bounds:
     """Bounds of tilt . c + coupling . d + twist (c x d) over an interval.
 
-    In the precessing frame it is X cos Phi + Y sin Phi + E (cos 2 Phi - 1) + F sin 2 Phi with
-    Phi = pi p tau, where X, Y, E and F are slow: their bounds, and those of Phi, give the rest.
+    In the precessing frame it is X cos Phi + Y sin Phi + E (cos 2 Phi - 1) + F sin 2 Phi with Phi = pi p tau. X, Y, E
+    and F vary slowly; their bounds and those of Phi give the bounds of the sum.
     """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
@@ -161,7 +161,7 @@ def row_bounds(
 
 
 def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
-    # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with their factors joined at the worst phase.
+    # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with the worst phase for each pair of factors.
     return Bounds(
         hypotenuse(cosine.value, sine.value),
         hypotenuse(cosine.derivative + omega * sine.value, sine.derivative + omega * cosine.value),
@@ -173,11 +173,11 @@ def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
 
 
 def each_taut_bounds(segment: Segment, arcs: Num[Array, ""], over: IntervalBounds) -> list[Bounds]:
-    """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's)."""
+    """Bounds of the variable part kappa_k - 1 over an interval; its derivatives are those of kappa_k."""
     cables = range(segment.coupling.shape[0])
     return [row_bounds(segment, arcs, over, segment.tilt, segment.coupling[k], segment.twist[k]) for k in cables]
 
 
 def taut_bounds(segment: Segment, arcs: Num[Array, ""], over: IntervalBounds) -> Bounds:
-    """The bounds of `each_taut_bounds` in arrays."""
+    """The bounds of `each_taut_bounds` as arrays."""
     return jax.tree.map(lambda *bounds: jnp.stack(bounds), *each_taut_bounds(segment, arcs, over))

@@ -1,16 +1,16 @@
-"""Verdicts that hold between the samples.
+"""Verdicts that also hold between samples.
 
 A slack f with |f''| <= M on an interval of length h satisfies f >= min(f at its ends) - M h^2 / 8.
-The interval [0, 1] is cut into blocks at the knots of the amplitude function, and each block into 16
-intervals; M comes from the closed form, one for each block. A segment is
+The interval [0, 1] is divided into blocks at the knots of the amplitude function, and each block into
+16 intervals; M comes from the closed form, for each block. A segment is
 
     proved feasible    if this lower bound exceeds the tolerance in every block,
-    proved infeasible  if a sample lies below minus the tolerance,
-    cut finer          otherwise, only where it is open; each cut into quarters divides the gap by 16,
-    undecided          if the gap has closed to the tolerance and zero is still inside.
+    proved infeasible  if a sample is below minus the tolerance,
+    divided further    otherwise, where it is open; division into quarters reduces the gap to a sixteenth,
+    undecided          if the gap is below the tolerance and still contains zero.
 
-The tolerance covers rounding (see `tolerance`). A limit that is touched, such as a target on the floor, counts as met:
-the slacks of limits are those of the wider limits of `problem.touchable`, and their tolerance is rounding alone.
+The tolerance covers rounding (see `tolerance`). A touched limit, such as a target on the floor, counts as met: the
+slacks of limits are those of the wider limits of `problem.touchable`, and their tolerance is rounding alone.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 1024
-# Lengths of batches for few segments: with limits, where a full batch takes several times as long, and in plans.
+# Batch lengths for few segments: with limits, for which a full batch takes several times as long, and in plans.
 SMALL = 128
-OF_PLANS = 16  # segments that plans have, at most
+OF_PLANS = 16  # for plans, which rarely have more segments
 FINEST_CUT = 12
-# Blocks of a segment in one step of a first pass.
+# Number of blocks of a segment in one step of a first pass.
 TOGETHER = 2
 
 
 @dataclasses.dataclass(frozen=True)
 class Proof:
-    """Proofs of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
+    """Proofs of n segments; a segment that is neither feasible nor infeasible is undecided.
 
     Fields:
-        feasible: (n,) every criterion that counts is met at all times.
-        infeasible: (n,) some criterion that counts is broken at some time.
-        met: (n, n_criteria) the criterion is met at all times; False where that is not known.
-        broken: (n, n_criteria) the criterion is broken at some time; False where that is not known.
-        sampled: (n, n_criteria) smallest slack that a sample of a first pass attains.
-        bound: (n, n_criteria) lower bound of the slack that a first pass proves.
+        feasible: (n,) whether every criterion that counts is always met.
+        infeasible: (n,) whether some criterion that counts is broken at some time.
+        met: (n, n_criteria) whether the criterion is proved to be always met.
+        broken: (n, n_criteria) whether the criterion is proved to be broken at some time.
+        sampled: (n, n_criteria) smallest slack at the samples of a first pass.
+        bound: (n, n_criteria) lower bound of the slack, proved by a first pass.
     """
 
     feasible: np.ndarray
@@ -69,7 +69,7 @@ class Proof:
 def tolerance(
     amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""], minimum: float = SMALLEST_MARGIN
 ) -> Float[Array, ""]:
-    """Distance from zero within which a slack is undecided: `minimum`, and what rounding may be."""
+    """Slacks closer to zero than this are undecided: `minimum`, plus the possible rounding."""
     terms = largest_term(amplitude, segment, arcs)
     return minimum + 512.0 * jnp.finfo(terms.dtype).eps * terms
 
@@ -83,7 +83,7 @@ def tolerances(problem: Problem, segment: Segment, arcs: Array) -> Array:
 def block_bounds(
     problem: Problem, segments: Segment, arcs: Float[Array, "n"], start: Float[Array, "n"], stop: Float[Array, "n"]
 ) -> tuple[tuple[Float[Array, "n"], ...], tuple[Float[Array, "n"], ...]]:
-    """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment."""
+    """Smallest sampled slack and proved lower bound of each criterion, over one block of each segment."""
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
@@ -122,7 +122,7 @@ def prove(
     ignored: Bool[np.ndarray, "n n_criteria"] | None = None,
     coarse: tuple[np.ndarray, ...] | None = None,
 ) -> Proof:
-    """Decide segments, each with a given number of arcs."""
+    """Prove or refute segments, each with a given number of arcs."""
     arcs = np.asarray(arcs, float)
     table = blocks(problem.amplitude, int(arcs.max()))
     sampled, bound, near = first_pass(problem, segments, arcs) if coarse is None else coarse
@@ -139,21 +139,21 @@ def prove(
 
 
 def length(problem: Problem, count: int, few: int = 0) -> int:
-    """Length of the batches for some segments, or blocks of them."""
+    """Length of the batches for a number of segments, or of their blocks."""
     return SMALL if count <= few or (2 * count <= BATCH and limits_set(problem.limits)) else BATCH
 
 
 def is_met_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
 ) -> Bool[np.ndarray, "n n_criteria"]:
-    """Criteria that no sample of a first pass breaks."""
+    """Criteria that are met at all samples of a first pass."""
     arcs = np.asarray(arcs, float)
     sampled, _, near = first_pass(problem, segments, arcs)
     return sampled >= -near
 
 
 def first_pass(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
-    """A first pass over segments: smallest samples and proved bounds of all criteria, and their tolerances."""
+    """Smallest samples and proved bounds of all criteria by a first pass over segments, and tolerances."""
     table = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
@@ -167,8 +167,8 @@ def first_pass(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) 
 def _cut(
     problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, counted: np.ndarray, table
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are blocks
-    # of segments that are still open: owner, start, stop.
+    # Return which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are open
+    # blocks of segments: owner, start, stop.
     problem, (edges, counts) = touchable(problem), table
     broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
     count = counts[arcs.astype(int)]

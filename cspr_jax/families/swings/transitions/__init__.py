@@ -1,4 +1,4 @@
-"""Transitions from rest and back, thesis chapter 1: numbers of oscillations, by envelopes and by proof.
+"""Transitions from and to rest, thesis chapter 1: numbers of oscillations, by envelopes and by proof.
 
 Files, each importing only from those above it:
 
@@ -6,9 +6,9 @@ Files, each importing only from those above it:
     zero_tension             closed forms for the amplitude function A = tau, sections 1.6 and 1.10
     envelopes                lower envelopes of the pseudotensions of a transition
     envelope_oscillations    numbers of oscillations for which the envelopes stay positive
-    redundant_inclinations   inclinations that need the fewest oscillations there
+    redundant_inclinations   inclinations that need the fewest oscillations with redundant cables
     oscillations             smallest numbers of oscillations of many transitions, and their margins
     transition_leg           transitions in a plan
     oscillations_map         maps of numbers of oscillations
-    envelopes_map            maps of the oscillations that each time of a transition needs
+    envelopes_map            maps of the oscillations needed at each time of a transition
 """

@@ -4,9 +4,9 @@ With Omega = 4 pi^2 N - A''(1), N = n^2, the normalised pseudotension of cable k
 
     1 - C cos(2 pi n tau) + S sin(2 pi n tau),  C = (v + w) c / Omega - v A,  S = 4 pi n (v + w) A' / Omega,
 
-c = A'' - A A''(1). It is positive whatever the phase if C^2 + S^2 < 1, (1.39): a quadratic in
-Omega. Its largest root, the largest over tau and over the cables, is what N must exceed. That
-is sufficient for taut cables, not necessary. n is a real number here: a motion takes the next integer.
+c = A'' - A A''(1). It is positive for any phase if C^2 + S^2 < 1, (1.39), which is quadratic in Omega. N must exceed
+the largest root, the maximum over tau and over the cables. This is sufficient for taut cables, not necessary. n is a
+real number here: a motion takes the next integer.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from cspr_jax.numerics.elementary import vertex
 from cspr_jax.numerics.search.minima import GOLDEN, Bracket, golden_step, inner_points
 from cspr_jax.numerics.shapes import Float
 
-# Samples of each piece of the amplitude function; between them the maximum is refined.
+# Number of samples of each piece of the amplitude function; the maximum is refined between them.
 SAMPLES = 64
 UNROLL = 4
-# Golden section narrows the bracket to a three-hundredth, parabolas then find the time to rounding.
+# Steps of golden section, which narrow the bracket to 1/300; parabolas then find the time to rounding.
 STEPS = 12
 PARABOLAS = 2
 SMALLEST_FRACTION = 1e-3
 TINY = 1e-100
-# Steps of golden section for a best inclination: the bracket ends at 4e-9 of where it began.
+# Steps of golden section for the best inclination, which narrow the bracket to 4e-9 of its width.
 INCLINATION_STEPS = 40
 EPSILONS = 50
 SMALLEST_WIDTH = 1e-9
@@ -43,13 +43,13 @@ LARGEST_INCLINATION = 1.0 - 1e-9
 def squared_oscillations_at(
     amplitude: Amplitude, weight: Float[Array, ""], inclination: Float[Array, ""], tau: Float[Array, ""]
 ) -> Float[Array, ""]:
-    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at one time, whatever the phase."""
+    """N_k(v, tau) of (1.44): squared number of oscillations that keep a cable taut at one time, for any phase."""
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
     return _squared(_root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2)), end)
 
 
 def _squared(omega: Array, end: Array) -> Array:
-    # Return N of Omega.
+    # Convert Omega to N.
     return (omega + end) / (4.0 * math.pi**2)
 
 
@@ -62,19 +62,19 @@ def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]
     rest = load**2 * (c**2 + 4.0 * end * rate**2)
     squared = half**2 + d * rest
     root = jnp.sqrt(jnp.maximum(squared, 0.0))
-    # The second form of the root is taken where the first would cancel. Without a real root every Omega keeps the
-    # envelope up.
+    # Take the second form of the root where the first loses digits by cancellation. Without a real root, every Omega
+    # keeps the envelope positive.
     is_second = half > 0.0
     largest = jnp.where(is_second, rest, root - half) / jnp.where(is_second, root + half, jnp.where(d > 0.0, d, 1.0))
     omega = jnp.where(squared < 0.0, 0.0, jnp.maximum(largest, 0.0))
-    # If |v A| >= 1, some phase takes the effector to the spool plane, and one cable slack before that.
+    # If |v A| >= 1, the effector reaches the spool plane at some phase, and a cable is slack before that.
     return jnp.where(d > 0.0, omega, jnp.inf)
 
 
 @jax.jit
 def _samples(amplitude: Amplitude) -> Array:
-    # Every knot is among the samples, which are dense towards the ends of each piece, where steep inclinations have
-    # their maximum.
+    # Return samples that include every knot, and are dense towards the ends of each piece, where steep inclinations
+    # have their maximum.
     ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
     part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
     inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part[None]
@@ -82,7 +82,7 @@ def _samples(amplitude: Amplitude) -> Array:
 
 
 def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:
-    # Find by golden section where a function that falls and then rises is smallest.
+    # Minimise a function that first falls and then rises, by golden section.
     left, right = inner_points(low, high)
     start = Bracket(low, high, left, right, function(left), function(right))
     last = lax.fori_loop(0, steps, lambda _, bracket: golden_step(function, bracket)[0], start)
@@ -109,8 +109,8 @@ def _needed(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array
 
 
 def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
-    # Find where the two highest peaks of a sampled function lie, and the height of the first; samples are taken one
-    # after the other, since sorting them would cost five times as much.
+    # Find the times of the two highest peaks of a sampled function, and the height of the first. Take samples one after
+    # the other, since sorting them would cost five times as much.
     none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
     nowhere = jnp.zeros((), jnp.int32)
 
@@ -134,8 +134,8 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    # Return the largest value, not negative, near the only peak between two times. Where |v A| comes near to 1 it is
-    # sharp, but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
+    # Return the largest value, not negative, near the only peak between two times. The peak is sharp if |v A| is close
+    # to 1, but its reciprocal is smooth: lay parabolas through the reciprocal unless it is too large.
     middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
 
     def narrow(_, state):
@@ -152,18 +152,18 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
 def least_oscillations(
     amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""]
 ) -> Float[Array, ""]:
-    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94)."""
+    """Real number of oscillations that the envelopes require: (1.48), (1.94)."""
     return jnp.sqrt(jnp.maximum(_needed(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
 
 
 @jax.jit
 def _extreme(weights: Array) -> Array:
-    # The loads that a given N allows form an interval about zero: only the extreme cables count.
+    # The loads that a given N allows are an interval about zero: only the extreme cables matter.
     return jnp.stack([jnp.max(weights), jnp.min(weights)])
 
 
 def horizontal_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
-    """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53)."""
+    """Real number of oscillations that the envelopes require on a horizontal transition: (1.53)."""
     largest = jnp.max(jnp.abs(weights), keepdims=True)
     return jnp.sqrt(jnp.maximum(_needed(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
 
@@ -188,7 +188,7 @@ def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
     def needed(epsilon: float) -> float:
         return float(horizontal_oscillations(named("effective", epsilon), weights))
 
-    # A coarse pass finds the valley; golden section goes down in it.
+    # Find the valley coarsely, then its minimum by golden section.
     trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
     index = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
     low, high = float(trial[max(index - 1, 0)]), float(trial[min(index + 1, EPSILONS - 1)])

@@ -1,8 +1,8 @@
-"""Lower envelopes of the pseudotensions along a transition, thesis chapter 1, and what they prove.
+"""Lower envelopes of the pseudotensions along a transition, thesis chapter 1, and proofs from them.
 
-Whatever the phase of the swing, the normalised pseudotension of a cable is at least 1 - sqrt(C^2 + S^2), (1.39).
-C and S hold no fast oscillation, so that a few samples with a bound of the second derivative between them prove
-a full transition, where the pseudotensions themselves need many samples an arc.
+For any phase of the swing, the normalised pseudotension of a cable is at least 1 - sqrt(C^2 + S^2), (1.39). C and S
+have no fast oscillation, so a few samples, with a bound of the second derivative between them, prove a full transition;
+the pseudotensions themselves need many samples per arc.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jax import Array, lax
 from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.numerics.shapes import Float, Num
 
-# Intervals of each piece of the amplitude function.
+# Number of intervals of each piece of the amplitude function.
 INTERVALS = 64
 UNROLL = 4
 
@@ -47,7 +47,7 @@ def _squared(load: Array, inclination: Array, n: Array, omega: Array, end: Array
 
 
 class _EnvelopeInterval(NamedTuple):
-    # An interval without a knot inside: A, A', A'' where it stops, bounds of |A| to |A''''| over it, its width.
+    # An interval without a knot inside: A, A', A'' at its end, bounds of |A| to |A''''| over it, and its width.
     values: tuple[Array, ...]
     bounds: tuple[Array, ...]
     width: Array
@@ -66,10 +66,10 @@ def _intervals(amplitude: Amplitude) -> _EnvelopeInterval:
 def proved_envelope(
     amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""], n: Num[Array, ""]
 ) -> Float[Array, ""]:
-    """Lower bound of all pseudotensions, and of the depth below the spools over z0, on a full transition."""
+    """Lower bound of all pseudotensions, and of the depth below the spools over z0, over a full transition."""
     end = derivatives(amplitude, jnp.ones_like(n), order=2)[2]
     omega = (2.0 * math.pi * n) ** 2 - end
-    # The squares are convex in the load: no load between these, such as 0 for the depth, has a lower envelope.
+    # The squares are convex in the load: loads between these, such as 0 for the depth, have no lower envelopes.
     loads = jnp.stack(
         [jnp.maximum(jnp.max(weights) + inclination, 0.0), jnp.minimum(jnp.min(weights) + inclination, 0.0)]
     )
@@ -88,7 +88,7 @@ def proved_envelope(
 
 
 def _curvature(load: Array, v: Array, n: Array, omega: Array, end: Array, interval: _EnvelopeInterval) -> Array:
-    # Bound of the second derivative of C^2 + S^2 over an interval, from those of C, S and their derivatives.
+    # Bound the second derivative of C^2 + S^2 over an interval, from bounds of C, S and their derivatives.
     a, fraction, gain = interval.bounds, load / omega, 4.0 * math.pi * n * load / omega
     c0, c1, c2 = (fraction * (a[j + 2] + a[j] * jnp.abs(end)) + v * a[j] for j in range(3))
     s0, s1, s2 = (gain * a[j + 1] for j in range(3))

@@ -1,4 +1,4 @@
-"""Maps of the oscillations that each time of a transition needs, and of the envelopes there."""
+"""Maps of the oscillations needed at each time of a transition, and of the envelopes."""
 
 from functools import partial
 
@@ -17,7 +17,7 @@ from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.schema.tiles import Grid
 
-# How far an envelope may lie below zero at the number of oscillations that keeps it above.
+# An envelope may lie below zero by this much at the number of oscillations that keeps it positive.
 _CHECK_ERROR = 1e-7
 
 
@@ -29,7 +29,7 @@ def _at_times(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
         n = counts.least_oscillations(amplitude, w, v)
         squared = jax.vmap(lambda k: counts.squared_oscillations_at(amplitude, k, v, tau))(w)
         envelope = jax.vmap(lambda k: lower_envelope(amplitude, k, v, n, tau))(w)
-        # Cable 0 stands for all of them.
+        # Cable 0 means all cables.
         index = jnp.maximum(cable - 1, 0)
         numbers = (
             n,
@@ -42,10 +42,10 @@ def _at_times(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
 
 
 class TransitionEnvelopesMap(MinimumOscillationsMap):
-    """Squared oscillations and envelopes at each time; see `GridMap`."""
+    """Squared numbers of oscillations, and envelopes, at each time; see `GridMap`."""
 
     proves = False
-    any_cables = False  # envelopes are of pseudotensions, which the motion must determine
+    any_cables = False  # envelopes need pseudotensions that the motion determines
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -1,7 +1,7 @@
-"""Smallest number of oscillations of many transitions: by the envelopes, and by the true pseudotensions.
+"""Smallest number of oscillations of many transitions, by the envelopes and by the pseudotensions themselves.
 
-The envelopes (1.39) are sufficient, not necessary: a motion may be taut with one oscillation fewer. So the
-smallest integer that they allow stands beside the smallest that is proved from the pseudotensions themselves.
+The envelopes (1.39) are sufficient, not necessary: a motion may be taut with one oscillation fewer. So answers hold
+both the smallest integer that the envelopes allow, and the smallest that is proved from the pseudotensions.
 """
 
 from __future__ import annotations
@@ -34,22 +34,23 @@ from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.runtime.stages import stage
 
-# Samples of the screen; odd, so that they do not fall on the zeros of an oscillation.
+# Number of samples of the screen, odd so that they do not coincide with the zeros of an oscillation.
 SAMPLES = 61
 ENVELOPE_ERROR = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
 class OscillationAnswers(Answers):
-    """One answer for each transition; an oscillation has two arcs.
+    """Answers for transitions; an oscillation has two arcs.
 
     Fields:
         oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
-        tried_oscillations: (n,) the number that duration and margins belong to.
+        tried_oscillations: (n,) number for which duration and margins are reported.
         envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
-        least_oscillations: (n,) smallest real number that does; NaN where |v A| reaches 1, so that none does.
-        inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
-        used_inclination: (n,) v.
+        least_oscillations: (n,) smallest such real number; NaN where |v A| reaches 1, so that there is none.
+        inclination_gain: (n,) oscillations, a real number, that the inclination saves relative to a horizontal
+            transition.
+        used_inclination: (n,) inclination v.
         used_z0: (n,) depth of p0 below the centroid of the spools, m.
     """
 
@@ -90,7 +91,7 @@ def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
 def best_inclinations(
     problem: Problem, targets: Float[np.ndarray, "n 3"], *, max_arcs: int = 30
 ) -> Float[np.ndarray, "n"]:
-    """The inclination of each target that asks for the fewest oscillations."""
+    """The inclination of each target that needs the fewest oscillations."""
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.families.swings.transitions.redundant_inclinations import redundant_inclinations
 
@@ -115,7 +116,7 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 
 @jax.jit
 def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
-    # Horizontal transitions take a third of the work.
+    # Horizontal transitions take only a third of the work.
     weights, _ = arguments
     needed = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
     return needed, jnp.zeros_like(needed)
@@ -123,7 +124,7 @@ def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 
 @partial(jax.jit, static_argnames="largest")
 def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.Array], *, largest: int) -> jax.Array:
-    # Bound 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and the depth, which has L = 0.
+    # Bound 1 + v A cos - L h: the pseudotension for the load L = v + w_k, and the depth for L = 0.
     high, low, v = loads
     tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
     value, rate, second_derivative = derivatives(amplitude, jnp.asarray(tau), order=2)
@@ -153,7 +154,7 @@ def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 def _proved_arcs(
     problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
 ) -> ProvedArcs:
-    # Return the whole numbers of oscillations that the envelopes prove.
+    # Return the integer numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
     kernel = partial(_proofs, problem.amplitude)
     bound, near = in_batches(kernel, (segments, *of_targets, n), batch_size=BATCH)
@@ -165,7 +166,7 @@ def minimum_oscillations(
 ) -> OscillationAnswers:
     """Smallest number of oscillations of transitions.
 
-    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
+    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are in float64.
     """
     check_numbers(problem.robot, z0, max_arcs)
     stage(f"numbers of oscillations, 1 to {max_arcs // 2}")
@@ -214,7 +215,7 @@ def _infinity(problem: Problem, inclination: np.ndarray) -> np.ndarray:
 def _on_more_cables(
     problem: Problem, segments: Segment, z0: np.ndarray, largest: int, arcs: np.ndarray | None
 ) -> OscillationAnswers:
-    # Envelopes are of pseudotensions, which the motion does not determine here.
+    # Redundant cables have no envelopes, since the motion does not determine pseudotensions.
     v = np.asarray(transition.inclination(segments))
     from cspr_jax.families.swings.redundant_arcs import redundant_arcs
 
@@ -236,14 +237,14 @@ def _on_more_cables(
 
 def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segment, arcs: jax.Array, tau: jax.Array):
     # (1.32) is linear in the load v + w_k: at any time the cables with the extreme loads have the smallest
-    # pseudotensions; load 0 is the depth below the spools.
+    # pseudotensions; load 0 gives the depth below the spools.
     del robot, limits
     v = transition.inclination(segment)
     loads = v + transition.weights(segment)
     _, steady, period = oscillation(segment, arcs)
     value, rate, second_derivative = derivatives(amplitude, tau, order=2)
     sine, cosine = sincospi(arcs * tau)
-    # d of `hypocycloid.swing` over the radius; the sense of an even number of arcs is -1.
+    # This is d of `hypocycloid.swing` over the radius; the sense of an even number of arcs is -1.
     coupling = (
         second_derivative - value * segment.end_curvature
     ) / period * cosine - 2.0 * steady / period * rate * sine / (math.pi * arcs)
@@ -254,9 +255,9 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
 def transition_margins(
     problem: Problem, segments: Segment, arcs: Int[np.ndarray, "n"]
 ) -> Float[np.ndarray, "n n_criteria"]:
-    """Smallest slack of each criterion along each transition, as `margins` gives them, from two functions of time.
+    """Smallest slack of each criterion along each transition, as in `margins`, from two functions of time.
 
-    Where both are positive, the slack of the cables stands in both of the first two columns.
+    Where both are positive, the first two columns both hold the slack of the cables.
     """
     if limits_set(problem.limits):
         return margins(problem, segments, arcs)

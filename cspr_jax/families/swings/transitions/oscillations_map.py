@@ -13,7 +13,7 @@ from cspr_jax.families.swings.transitions.transition import depth_for
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.schema.tiles import Grid
 
-# Depth that stands in where a target above the spools has no p0 below it: its verdict does not depend on the depth.
+# Depth for targets above the spools, which have no P0 below them: their verdict does not depend on it.
 _ANY_DEPTH = 1.0
 
 
@@ -24,7 +24,7 @@ class MinimumOscillationsMap(PointMassMap):
     any_cables = True
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
-        """Build what all tiles share; an amplitude function for bounds is allowed where tensions have envelopes."""
+        """Build what all tiles use; amplitude functions for bounds are allowed where tensions have envelopes."""
         super().__init__(robot_file, sweep_file, file, for_bounds=len(robot_file.base_points) == robot_file.dof)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,9 +1,9 @@
-"""Inclinations of transitions on more cables than degrees of freedom that need the fewest oscillations.
+"""Inclinations with the fewest oscillations for transitions on more cables than degrees of freedom.
 
-The motion determines no pseudotensions there, of which envelopes could tell what each inclination needs. Numbers of
-oscillations are tried in increasing order, each with inclinations on a grid, and the first number that samples do not
-refute with all of them takes the inclination with the largest slack, which a finer grid finds. `redundant_arcs` then
-proves the motion: a smaller number may exist between the inclinations that were tried.
+Redundant cables have no pseudotensions whose envelopes could tell what each inclination needs. So numbers of
+oscillations are tried in increasing order, each with inclinations on a grid; the first number that samples do not
+refute for all of them takes the inclination with the largest slack, which a finer grid refines. `redundant_arcs` then
+proves the motion. A smaller number may exist between the inclinations tried.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
 
-TRIED = 41  # inclinations of the first grid
-FINER = 9  # of each finer one
-ROUNDS = 3  # of finer grids
+TRIED = 41  # number of inclinations in the first grid
+FINER = 9  # number of inclinations in each finer grid
+ROUNDS = 3  # number of finer grids
 Transitions = Callable[[Problem, np.ndarray, np.ndarray], Segment]
 
 
 def redundant_inclinations(
     problem: Problem, targets: Float[np.ndarray, "n 3"], transitions: Transitions, *, max_arcs: int
 ) -> Float[np.ndarray, "n"]:
-    """The inclination of each target that needs the fewest oscillations; of these the one with the largest slack."""
+    """The inclination of each target with the fewest oscillations; among equals, that of the largest slack."""
     largest = LARGEST_INCLINATION / max(float(np.asarray(problem.amplitude.largest)[0]), 1.0)
     best, maximum = np.zeros(len(targets)), np.full(len(targets), -np.inf)
     is_open = targets @ np.asarray(plane_normal(problem.robot)) > 0.0
@@ -43,7 +43,7 @@ def redundant_inclinations(
             break
         stage(f"inclinations for {arcs // 2} oscillations")
         slack = partial(_slacks, problem, transitions, targets[rows], arcs)
-        # The ends belong to no transition.
+        # Leave out the ends, at which there is no transition.
         fractions, step = np.linspace(-1.0, 1.0, TRIED + 2)[1:-1], 2.0 * largest / (TRIED + 1)
         tried = np.tile(largest * fractions, (len(rows), 1))
         slacks = slack(tried, FEW)

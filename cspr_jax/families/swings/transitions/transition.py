@@ -1,11 +1,11 @@
 """Transitions between rest and a point beyond the static workspace, thesis chapter 1, in the product's axes.
 
-The effector swings about p0 on the straight line through the target, in n oscillations that grow
-like the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the
-duration (1.29) its end acceleration is that of a pendulum hung from the centroid of the spools.
+The effector oscillates about p0 on the straight line through the target, in n oscillations that grow
+with the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the duration
+(1.29) its end acceleration is that of a pendulum that hangs from the centroid of the spools.
 
 It is a segment of chapter 2 from rest with an even number of arcs p = 2 n, except that A''(1) need
-not vanish. Backwards in time it returns to rest, (1.56) to (1.58). With a constant amplitude it is
+not vanish. Reversed in time it returns to rest, (1.56) to (1.58). With a constant amplitude it is
 a swing between the target and its opposite point.
 """
 
@@ -41,18 +41,18 @@ def steady(segment: Segment) -> Segment:
 
 
 def inclination(segment: Segment) -> Float[Array, "..."]:
-    """Depth of the target below the spools, less that of p0, over z0: v of (1.31)."""
+    """Depth of the target below the spools minus that of p0, over z0: v of (1.31)."""
     return segment.end_radius * segment.tilt[..., 0]
 
 
 @jax.jit
 def weights(segment: Segment) -> Float[Array, "... n_cables"]:
-    """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots."""
+    """The weighted trajectory parameters w_k: (1.37) and (1.93), by number of cables."""
     load = -segment.end_radius[..., None] * segment.coupling[..., 0]
     return load - inclination(segment)[..., None]
 
 
 @jax.jit
 def depth_for(robot: PointMassRobot, target: Float[Array, "3"], inclination: Float[Array, ""]) -> Float[Array, ""]:
-    """The depth z0 of p0 that gives a target an inclination, from (1.31)."""
+    """The depth z0 of p0 for which a target has a given inclination, from (1.31)."""
     return plane_normal(robot) @ target / (1.0 + inclination)

@@ -1,4 +1,4 @@
-"""Leg of transitions: rest to a target, swings at it, back to rest: chapter 1."""
+"""Leg of transitions, chapter 1: from rest to a target, swings at the target, back to rest."""
 
 import jax
 import numpy as np
@@ -27,7 +27,7 @@ class Transitions(Leg):
         pairs = list(zip(waypoints.poses[:-1], waypoints.poses[1:], strict=True))
         for i, (start, end) in enumerate(pairs):
             _check_pair(waypoints, i, start, end)
-        # A transition to rest is one from rest backwards in time, (1.56) to (1.58).
+        # A transition to rest is one from rest, reversed in time, (1.56) to (1.58).
         self._backwards = np.array([end.rest for _, end in pairs])
         self._steady = np.array([not (start.rest or end.rest) for start, end in pairs])
         # Index of the pose that is the target of each segment.

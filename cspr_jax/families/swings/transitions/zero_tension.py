@@ -1,8 +1,8 @@
-"""The zero-tension amplitude function A = tau, for which everything has a closed form, thesis section 1.6 and 1.10.
+"""The zero-tension amplitude function A = tau, for which all formulas are closed, thesis sections 1.6 and 1.10.
 
-It is no motion, since it breaks (1.27) and (1.28). On horizontal transitions it spreads the load evenly over
-the time, so that it bounds the others; on inclined ones it is a guide. w_hi and w_lo are the largest and the
-smallest weight, w_C the one of larger magnitude.
+It is no motion, since it breaks (1.27) and (1.28). On horizontal transitions it spreads the load evenly over time, so
+it is a bound for all other functions; on inclined ones it is a guide. w_hi and w_lo are the largest and the smallest
+weight, w_C is the one of larger magnitude.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from cspr_jax.numerics.shapes import Float
 
 
 def least_oscillations(weights: Float[Array, "n_cables"], inclination: Float[Array, ""]) -> Float[Array, ""]:
-    """Oscillations that the envelopes ask for with A = tau: n_gdl of (1.115), n_idl of (1.104) for v = 0."""
+    """Oscillations that the envelopes require with A = tau: n_gdl of (1.115), n_idl of (1.104) for v = 0."""
     return jnp.max(jnp.abs(weights + inclination)) / (math.pi * jnp.sqrt((1.0 - inclination) * (1.0 + inclination)))
 
 
 def best_inclination(weights: Float[Array, "n_cables"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """The inclination that asks for the fewest oscillations with A = tau: (1.117) and (1.118).
+    """The inclination that requires the fewest oscillations with A = tau: (1.117) and (1.118).
 
     Either it divides the load between the two extreme cables, v = -(w_hi + w_lo) / 2, or the cable with the
     largest weight has its own minimum before that, at v = -1 / w_C.
