@@ -1,1 +1,1 @@
-"""The package from Python, in the axes of the robot file: what the command line calls, and one motion at a time."""
+"""The package from Python, in the axes of the robot file: all that the command line does, and single motions."""

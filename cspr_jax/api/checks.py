@@ -1,4 +1,4 @@
-"""Checks of motions from Python: is a motion within the limits of a robot, at every time, and if not, where?"""
+"""Checks of motions from Python: does a motion always keep within the limits of a robot, and if not, where?"""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Check(Displayed):
     """A motion that was checked.
 
     Fields:
-        plan: the motion as a plan of one segment, from which files, films and models of it are written.
+        plan: the motion as a plan of one segment, from which its files, films and models are written.
     """
 
     plan: Plan
@@ -105,7 +105,7 @@ class Check(Displayed):
 
     @property
     def margin(self) -> float:
-        """Smallest distance of a tension from its limits, N; of redundant cables the largest that all can keep."""
+        """Smallest distance of a tension from its limits, N; for redundant cables, the largest that all can keep."""
         return float(self.plan.answers.margin[0])
 
     @property
@@ -115,17 +115,17 @@ class Check(Displayed):
 
     @property
     def cause(self) -> list[dict[str, Any]]:
-        """Causes why the motion is not feasible, the worst one first."""
+        """Reasons why the motion is not feasible, the worst one first."""
         return self._object["cause"]
 
     @property
     def failing(self) -> np.ndarray:
-        """Intervals of time in which the motion fails, (m, 2) s."""
+        """Intervals of time in which the motion breaks a criterion, (m, 2) s."""
         return self._proof.failing
 
     @property
     def demands(self) -> dict[str, dict[str, Any]]:
-        """Largest demand on each limit: value, proved bound, what is allowed, cable and time."""
+        """Peak value for each limit, with proved bound, allowed value, cable and time."""
         return self._object["demands"]
 
     @cached_property
@@ -138,10 +138,10 @@ class Check(Displayed):
         return check_report.shown_proof(self.plan)
 
     def slower(self) -> "Stretched":
-        """Find the least uniform stretching of time with which the motion is feasible.
+        """Find the smallest uniform stretching of time that makes the motion feasible.
 
         Returns:
-            the factor, and the check of the motion that it stretches.
+            the factor, and the check of the stretched motion.
         """
         with double_precision():
             if not self.plan.legs[0].motions:
@@ -164,10 +164,10 @@ class Check(Displayed):
 
 
 class Stretched(NamedTuple):
-    """Motion that was slowed down uniformly.
+    """Motion that is slowed down uniformly.
 
     Fields:
-        factor: by which its duration grew; 1: it was feasible; NaN: no stretching is feasible.
+        factor: stretching of the duration; 1 if the motion was feasible, NaN if no stretching makes it feasible.
         is_static: whether the robot can rest at every position of the motion, so that some stretching is feasible.
         check: check of the stretched motion, or None.
     """
@@ -217,33 +217,33 @@ def check(  # noqa: PLR0913
     duration: Positive | None = None,
     limits: LimitsOrSpec = None,
 ) -> Check:
-    """Check a motion against the limits of a robot, at every time, with a proof.
+    """Check with a proof whether a motion always keeps the limits of a robot.
 
     Args:
         robot: a robot, the name of one of the catalogue, or the path of a robot file.
-        times: (n,) increasing, s; or, in place of times and positions, the path of a file, a spline of SciPy or a
-            function of jax whose values are positions (3,), of a platform also with quaternions behind them (7,), or a
-            motion of this package. Functions are only sampled: they are refuted, or undecided.
-        positions: (n, 3) of the mass centre, in the axes of the robot, m.
+        times: (n,) increasing, s. Instead of times and positions: the path of a file, a spline of SciPy, a motion of
+            this package, or a function of jax whose values are positions (3,), of a platform positions and quaternions
+            (7,). Functions are only sampled: they are refuted, or undecided.
+        positions: (n, 3) positions of the mass centre, in the axes of the robot, m.
         quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
         velocities: (n, 3) m/s, for Hermite pieces.
-        accelerations: (n, 3) m/s^2, likewise.
-        interpolation: "cubic", "quintic" or "hermite"; None: as the file says, else "hermite" with velocities, "cubic"
-            without.
+        accelerations: (n, 3) m/s^2, for Hermite pieces.
+        interpolation: "cubic", "quintic" or "hermite"; None: as the file says, else "hermite" if there are velocities,
+            else "cubic".
         ends: "rest", "natural" or "periodic"; None: as the file says, else "rest".
-        smooth: standard deviation of the noise of positions, m, which a smoothing spline takes off; None: 0.
-        point: point of a platform whose positions these are, "mass-centre" or "origin" of its axes; None: as the file
+        smooth: standard deviation of the noise of positions, m, which a smoothing spline removes; None: 0.
+        point: point of a platform whose positions are given, "mass-centre" or "origin" of its axes; None: as the file
             says, else the mass centre.
-        trajectory: `id` of one of several trajectories that a file of CASPR holds; None: anything else.
-        duration: of a function, s; None: anything else.
+        trajectory: `id` of one of several trajectories in a file of CASPR; None for everything else.
+        duration: duration of a function, s; None for everything else.
         limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
 
     Returns:
         the check, feasible or not.
 
     Raises:
-        ConfigError: a mistake in a file.
-        InputError: samples that make no motion, or an impossible argument.
+        ConfigError: a file has a mistake.
+        InputError: samples that do not define a motion, or an impossible argument.
     """
     samples = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     _check_source(times, {"positions": positions, **samples}, duration)
@@ -265,12 +265,12 @@ def check(  # noqa: PLR0913
 
 
 def _is_curve(times: Any) -> bool:
-    # Piecewise polynomials of SciPy have x, B-splines t.
+    # Piecewise polynomials of SciPy have an attribute x, B-splines t.
     return hasattr(times, "x") or hasattr(times, "t")
 
 
 def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None) -> None:
-    # Samples belong to an array of times alone, and a duration to a function.
+    # Only an array of times has samples, and only a function needs a duration.
     is_file, is_motion = isinstance(times, str | Path), hasattr(times, "state")
     if is_file or is_motion or callable(times):
         kind = "a file" if is_file else "a motion" if is_motion else "a curve or a function"
@@ -300,7 +300,7 @@ def check_file(
 
 
 def _of_file(error: ConfigError, motion: Path, limits: Path | None) -> ConfigError:
-    # Keys of Python have no file; here they have one.
+    # Errors about arguments name no file: name the given one.
     before = f"{NAME}: "
     if not error.args or not str(error.args[0]).startswith(before):
         return error
@@ -314,7 +314,7 @@ def _check_of(spec: PlanFile, text: str) -> Check:
 
 
 def _shown(planned: planning.PlannedMotions, text: str) -> Check:
-    # Files of the motion keep the text, from which pictures know limits and obstacles.
+    # Files of the motion store the text, from which pictures take limits and obstacles.
     fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
     return Check(Plan(**fields | {"text": text}))
 

@@ -34,13 +34,13 @@ class ManyChecks(Columns):
     """Checks of n motions of one robot.
 
     Fields:
-        verdict: (n,) `Verdict` flags; 0 is feasible, proved.
+        verdict: (n,) `Verdict` flags; 0 if proved feasible.
         duration: (n,) s.
-        margin: (n,) smallest distance of a tension from its limits, N, as of `Check`.
+        margin: (n,) smallest distance of a tension from its limits, N, as in `Check`.
         margin_bound: (n,) proved lower bound of the margin, N.
-        limit_margin: (n,) smallest slack of other limits, over the limit; inf without any.
-        failing: n arrays (m, 2) of intervals of time in which each fails, s.
-        causes: for each motion why it is not feasible, the worst cause first.
+        limit_margin: (n,) smallest slack of other limits, over the limit; inf without other limits.
+        failing: n arrays (m, 2) of intervals of time in which each motion fails, s.
+        causes: for each motion the reasons why it is not feasible, the worst one first.
     """
 
     verdict: np.ndarray
@@ -53,7 +53,7 @@ class ManyChecks(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether each motion is feasible, (n,): proved."""
+        """Tell which motions are proved feasible, (n,)."""
         return self.verdict == 0
 
 
@@ -74,20 +74,20 @@ def check_many(
 
     Args:
         robot: a robot, the name of one of the catalogue, or the path of a robot file.
-        times: (n,) of all motions, or (k, n) increasing, s.
-        positions: (k, n, 3) of the mass centre, in the axes of the robot, m.
+        times: (n,) for all motions, or (k, n), increasing, s.
+        positions: (k, n, 3) positions of the mass centre, in the axes of the robot, m.
         quaternions: (k, n, 4) orientations of the platform, scalar first; None: its own axes.
         velocities: (k, n, 3) m/s, for Hermite pieces.
-        accelerations: (k, n, 3) m/s^2, likewise.
-        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" with velocities, "cubic" without.
+        accelerations: (k, n, 3) m/s^2, for Hermite pieces.
+        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" if there are velocities, else "cubic".
         ends: "rest", "natural" or "periodic"; None: "rest".
-        limits: override those of the robot, as for `check`.
+        limits: replace those of the robot, as for `check`.
 
     Returns:
         the checks.
 
     Raises:
-        InputError: samples that make no motion, or an impossible argument.
+        InputError: samples that do not define a motion, or an impossible argument.
     """
     spec = checked_plan(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
     samples_of_all = (positions, quaternions, velocities, accelerations)

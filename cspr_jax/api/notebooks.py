@@ -1,4 +1,4 @@
-"""Texts that interactive sessions show of plans, checks and results, with pictures in notebooks."""
+"""Texts of plans, checks and results in interactive sessions, with pictures in notebooks."""
 
 import abc
 import base64
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from cspr_jax.store.reading.result import Result
 
 MOST_LINES = 8
-DPI = 80  # of pictures in notebooks
+DPI = 80  # resolution of pictures in notebooks
 
 
 class Displayed(abc.ABC):
-    """Object that shows itself in a few lines; its picture is drawn only when a notebook asks for it."""
+    """Object that shows itself in a few lines; its picture is drawn only if a notebook asks for it."""
 
     @abc.abstractmethod
     def _summary(self) -> list[str]: ...
@@ -34,13 +34,13 @@ class Displayed(abc.ABC):
         text = f"<pre>{html.escape(repr(self))}</pre>"
         try:
             image = _image(self._drawn_result())
-        except CsprError:  # nothing of it can be drawn
+        except CsprError:  # the object has nothing to draw
             return text
         return f'{text}<img alt="" src="data:image/png;base64,{image}">'
 
 
 def _image(result: "Result") -> str:
-    from cspr_jax.outputs.plots.draw import drawn  # matplotlib takes time
+    from cspr_jax.outputs.plots.draw import drawn  # loads matplotlib, which is slow
     from cspr_jax.outputs.plots.style.style import Style, in_style, laid_out, rendered
 
     style = Style(dpi=DPI)
@@ -51,7 +51,7 @@ def _image(result: "Result") -> str:
 
 
 def plan_summary(plan: Any) -> list[str]:
-    """Robot, durations and verdicts of a plan, as lines."""
+    """Lines with the robot, durations and verdicts of a plan."""
     segments = plan.to_dict()["segments"]
     word = "feasible, proved" if plan.feasible else "not proved feasible"
     families, total = ", ".join(plan.keys.families), float(np.sum(plan.answers.duration))

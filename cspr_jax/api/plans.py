@@ -1,4 +1,4 @@
-"""Plans from Python: what `cspr plan` computes, prints and writes."""
+"""Plans from Python: all that `cspr plan` computes, prints and writes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from cspr_jax.store.reading.result import Result
 
-# Errors name this in place of a file where there is none; paths are relative to the current folder.
+# Errors name this instead of a file if there is no file; paths are then relative to the current folder.
 NAME = Path("plan")
 
 
@@ -43,32 +43,32 @@ class Plan(Displayed, planning.PlannedMotions):
         """The motion as rows over time.
 
         Args:
-            rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment.
+            rate: rows per second over the full plan, Hz, plus one row at its end; None: `samples` rows per segment.
 
         Returns:
-            "t" (n,) s, and by the names of `schema.quantities.TRAJECTORY` columns (n, 3), (n, 4) or (n, n_cables), in
+            "t" (n,) s, and columns (n, 3), (n, 4) or (n, n_cables) by the names of `schema.quantities.TRAJECTORY`, in
             the axes of the robot file.
 
         Raises:
-            ConfigError: a rate that is no number > 0, or too many rows.
+            ConfigError: the rate is not positive, or gives too many rows.
         """
         with double_precision():
             return motion_files.rows(self, rate=rate)
 
     @checked()
     def rows_to_dict(self, rate: float | None = None) -> dict[str, Any]:
-        """The motion as rows over time, as plain values for JSON.
+        """The motion as rows over time, in plain values for JSON.
 
         Args:
             rate: as for `rows`.
 
         Returns:
-            "units" and "rows", each by the names of `rows`; None in place of what is not finite.
+            "units" and "rows", each by the names of `rows`; numbers that are not finite are None.
 
         Raises:
-            ConfigError: as `rows`.
+            ConfigError: as for `rows`.
         """
-        from cspr_jax.outputs import motion_json  # few plans are written so
+        from cspr_jax.outputs import motion_json  # few plans are written as JSON
 
         with double_precision():
             return motion_json.rows_object(self, rate)
@@ -80,7 +80,7 @@ class Plan(Displayed, planning.PlannedMotions):
         Args:
             path: file to write, .csv, .h5 or .json; an existing file is replaced.
             rate: as for `rows`.
-            anyway: whether to write a plan that is not feasible, too; the file says so.
+            anyway: whether to write a plan even if it is not feasible; the file says so.
 
         Returns:
             the path.
@@ -94,7 +94,7 @@ class Plan(Displayed, planning.PlannedMotions):
             raise ConfigError(path, "must end in .csv or .h5 or .json")
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
-        from cspr_jax.outputs import motion_json  # few plans are written so
+        from cspr_jax.outputs import motion_json  # few plans are written as JSON
 
         with double_precision():
             write = motion_json.write_json if path.suffix == ".json" else motion_files.write_rows
@@ -107,15 +107,15 @@ class Plan(Displayed, planning.PlannedMotions):
 
         Args:
             path: model to write, NAME.xml; existing files of both names are replaced.
-            step: the longest step of MuJoCo's integrator, s.
-            anyway: whether to write a plan that is not feasible, too; cables of the model never push.
+            step: longest step of MuJoCo's integrator, s.
+            anyway: whether to write a plan even if it is not feasible; cables of the model never push.
 
         Returns:
             the path.
 
         Raises:
-            ConfigError: the wrong ending, a plan that is not feasible or has no finite motion, or a step that is no
-                number > 0 or gives too many rows.
+            ConfigError: the wrong ending, a plan that is not feasible or has no finite motion, or a step that is not
+                positive or gives too many rows.
             StoreError: a file cannot be written.
         """
         path = Path(path)
@@ -131,18 +131,18 @@ class Plan(Displayed, planning.PlannedMotions):
 
     @checked()
     def animate(self, path: str | Path, speed: float = 1.0, anyway: bool = False) -> Path:
-        """Write a film of the motion: the robot in space, its cables coloured by tension, and its tensions.
+        """Write a film of the motion: the robot in space with its cables coloured by tension, and its tensions.
 
         Args:
             path: file to write, .gif, .mp4 or .html; an existing file is replaced.
             speed: playback speed relative to real time.
-            anyway: whether to show a plan that is not feasible, too; the film says so.
+            anyway: whether to show a plan even if it is not feasible; the film says so.
 
         Returns:
             the path.
 
         Raises:
-            ConfigError: the wrong ending, a speed that is no number > 0, a plan that is not feasible or has no finite
+            ConfigError: the wrong ending, a speed that is not positive, a plan that is not feasible or has no finite
                 motion, or no encoder for .mp4.
             StoreError: a file cannot be written.
         """
@@ -168,15 +168,15 @@ class Plan(Displayed, planning.PlannedMotions):
         return path
 
     def to_result(self) -> Result:
-        """The motion as `open_result` gives it of a motion file, to be drawn.
+        """The motion as if `open_result` had read it from a motion file, to be drawn.
 
         Returns:
             rows and segments.
 
         Raises:
-            StoreError: numbers that no motion file has.
+            StoreError: the motion has numbers that no motion file can hold.
         """
-        from cspr_jax.outputs.paths import path_columns  # plans load no results
+        from cspr_jax.outputs.paths import path_columns  # plans do not load results otherwise
         from cspr_jax.store.reading.result import motion_result
 
         with double_precision():
@@ -210,18 +210,18 @@ class Plan(Displayed, planning.PlannedMotions):
 
     @property
     def launch(self) -> LaunchResult | None:
-        """Release and flight of the object that the plan launches; None: it launches nothing."""
+        """Release and flight of the object that the plan launches; None if it launches nothing."""
         return next((outcome for outcome in self.outcomes if isinstance(outcome, LaunchResult)), None)
 
     @checked()
     def scatter(self, errors: LaunchErrors) -> Scatter:
-        """Scatter of the landings of the object that the plan launches.
+        """Scatter of the landings of the launched object.
 
         Args:
             errors: errors of the release and of the cables.
 
         Returns:
-            the landings of a sample of throws, their covariance, and the covariance for small errors, by derivatives.
+            the landings of a sample of throws, their covariance, and the covariance for small errors from derivatives.
 
         Raises:
             ConfigError: a plan that launches nothing.
@@ -234,13 +234,13 @@ class Plan(Displayed, planning.PlannedMotions):
 
     @checked()
     def to_xarray(self, rate: float | None = None) -> xarray.Dataset:
-        """The motion for xarray, with units and long names.
+        """The motion as a dataset of xarray, with units and long names.
 
         Args:
             rate: as for `rows`.
 
         Returns:
-            rows over "t" and segments over "segment", as `open_result(...).to_xarray()` gives them of a motion file.
+            rows over "t" and segments over "segment", as `open_result(...).to_xarray()` returns for a motion file.
 
         Raises:
             ConfigError: xarray is not installed, or too many rows.
@@ -256,14 +256,14 @@ def plan(given: File) -> Plan:
     """Plan a sequence of poses.
 
     Args:
-        given: path of a plan file, or its content as a dictionary: parsed TOML, which may hold arrays in place of
-            lists. Paths in a dictionary are relative to the current folder.
+        given: path of a plan file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
+            lists). Paths in a dictionary are relative to the current folder.
 
     Returns:
         the plan, feasible or not.
 
     Raises:
-        ConfigError: mistakes in the plan; its `lines` name all that were found.
+        ConfigError: the plan has mistakes; `lines` of the error names all that were found.
     """
     with double_precision():
         if isinstance(given, Mapping):

@@ -1,4 +1,4 @@
-"""Motions retimed, from Python: the same paths in the least time that all limits allow."""
+"""Retiming of motions from Python: the same paths in the least time that all limits allow."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def retime(
     grid: GridSize = GRID,
     ramp_time: RampTime = RAMP_TIME,
 ) -> Kind:
-    """Run along the paths of a plan, or of a checked motion, in the least time that all limits allow.
+    """Follow the paths of a plan, or of a checked motion, in the least time that all limits allow.
 
-    Every place at which the motion stops is kept, and so are its speeds at ends at which it moves. Between them the
-    faster motion takes the place of the planned one where it is proved.
+    All stops of the motion are kept, and so are its speeds at ends where it moves. Between them the faster motion
+    replaces the planned one if it is proved.
 
     Args:
         plan: a plan of any families but launches, or a check.
-        grid: number of cells of each part of the paths without a stop.
-        ramp_time: time in which accelerations, and so tensions, rise and fall, s; 0: they jump.
+        grid: number of cells for each part of the paths between stops.
+        ramp_time: time in which accelerations, and so tensions, rise and fall, s; 0 if they may jump.
 
     Returns:
         the plan, or the check, of the retimed motions; segments have "planned_duration", "gain" and "lower_bound".

@@ -37,19 +37,19 @@ def point_mass(
     """A point mass on cables.
 
     Args:
-        base_points: (n_cables, 3) spool points, m: at least three, two if planar, or one on a guide.
+        base_points: (n_cables, 3) spool points, m: at least three; two if planar; one on a guide.
         mass: mass, kg, positive.
         gravity: gravity, m/s^2, positive.
         z_axis: direction of the z axis, "down" or "up".
         planar: whether everything lies in the plane y = 0.
-        limits: limits beyond taut cables; None: none.
+        limits: limits in addition to taut cables; None: no limits.
         pattern: "1T" along a vertical guide, "2T" in the plane y = 0 or "3T" in space; None: "2T" if planar, else "3T".
 
     Returns:
         the robot.
 
     Raises:
-        InputError: a robot file with these numbers would be refused.
+        InputError: the numbers would not be accepted in a robot file.
     """
     pattern_name = pattern or ("2T" if planar else "3T")
     if planar and pattern_name != "2T":
@@ -77,16 +77,16 @@ def parallel_pair_robot(
         spool_radius: radius R, m, of the circle through the middles of the pairs' spools, a level equilateral triangle.
         platform_radius: radius r, m, of the circle through the points of the platform.
         mass: mass, kg, positive.
-        inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: that of a uniform disc of radius r.
+        inertia: (3, 3) about the mass centre in platform axes, kg m^2; None: that of a uniform disc of radius r.
         gravity: gravity, m/s^2, positive.
         z_axis: direction of the z axis, "down" or "up".
-        limits: limits beyond taut cables; None: none.
+        limits: limits in addition to taut cables; None: no limits.
 
     Returns:
-        the robot; while one winch drives each pair, it moves as the point mass of `three_cable_equivalent`.
+        the robot; if one winch drives each pair, it moves as the point mass of `three_cable_equivalent`.
 
     Raises:
-        InputError: a radius that is not positive, or a robot file with these numbers would be refused.
+        InputError: a radius is not positive, or the numbers would not be accepted in a robot file.
     """
     positions, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
     middles = spool_radius * np.stack([np.cos(positions), np.sin(positions), 0.0 * positions], axis=1)
@@ -111,14 +111,14 @@ def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
     """Point mass on three cables, equivalent to a platform on six in parallel pairs; see `robots.model.parallel_pairs`.
 
     Args:
-        robot: a platform whose axes are parallel to the fixed axes where the cables of its pairs are parallel.
+        robot: platform whose axes are parallel to the fixed axes when the cables of its pairs are parallel.
 
     Returns:
-        the robot, in the same axes; its tensions are those of the pairs, and its limits keep those of all six cables.
+        the robot, in the same axes; its tensions are those of pairs, and its limits imply those of all six cables.
 
     Raises:
         InputError: cables that do not form such pairs, a mass centre that is not between the points of a pair, or
-            limits that contradict each other.
+            contradictory limits.
     """
     if not isinstance(robot, PlatformRobot) or robot.pattern != RIGID or robot.pulleys is not None:
         raise InputError("robot", getattr(robot, "name", robot), "a rigid platform on six cables without pulleys")

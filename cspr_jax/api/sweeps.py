@@ -32,7 +32,7 @@ from cspr_jax.sweep.work import Executor
 if TYPE_CHECKING:
     import xarray
 
-# Errors and files are named after this where there is no sweep file; paths are relative to the current folder.
+# Name for errors and files if there is no sweep file; paths are then relative to the current folder.
 NAME = Path("sweep")
 
 keep_compiled_code = checked(name="keep_compiled_code", module=__name__)(_keep_compiled_code)
@@ -59,11 +59,10 @@ class DisplayedResult(Displayed, Result):
 
 @checked()
 def open_result(path: str | Path) -> Result:
-    """Read a result of `run` or `merge`, or a motion of `Plan.save`; also those of the command line.
+    """Read a result of `run` or `merge`, or a motion of `Plan.save`, including those of the command line.
 
     A motion in a .csv file has neither robot nor plan nor segments; it is named after its file. An HDF5 file may come
-    from anybody: another process reads it, within limits of memory and time, and its content is checked like a sweep
-    file.
+    from anybody: another process reads it, with limits of memory and time, and checks its content like a sweep file.
 
     Args:
         path: the file, or the directory of a run.
@@ -82,15 +81,15 @@ def open_result(path: str | Path) -> Result:
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """A sweep, its run directory, and its workers.
+    """A sweep with its run directory and its workers.
 
     Fields:
         sweep: the sweep.
         directory: directory of the run.
         options: options of the engine.
         hooks: calls for progress, warnings and stops.
-        workers: processes on this machine; None: as many as are usual for its kind of map.
-        scheduler: address of a dask.distributed scheduler, whose workers compute instead; None: none.
+        workers: number of processes on this machine; None: the usual number for its kind of map.
+        scheduler: address of a dask.distributed scheduler whose workers compute instead; None: none.
     """
 
     sweep: Sweep
@@ -112,14 +111,14 @@ class Job:
         return engine.Run(self.sweep, self.directory, self.options, self.hooks)
 
     def finished(self) -> Path | None:
-        """Path of the result if it exists and is complete; jax is not needed.
+        """Path of the result if it exists and is complete; this does not need jax.
 
         Returns:
             the path, or None.
 
         Raises:
             RefusedError: the directory, or the result in it, belongs to another sweep.
-            StoreError: the disk refuses to remove shards.
+            StoreError: shards cannot be removed from the disk.
         """
         return self._run.finished()
 
@@ -133,11 +132,11 @@ class Job:
             path of the result.
 
         Raises:
-            CsprError: as `run` does.
+            CsprError: as for `run`.
         """
-        with _executor(self, prepare) as executor:  # refuses in one line, so hints come after it
+        with _executor(self, prepare) as executor:  # errors here are single lines, so print hints after it
             robot = self.sweep.robot
-            from cspr_jax.config.hints import robot_hints, sweep_hints  # with the keys of plans, which take time
+            from cspr_jax.config.hints import robot_hints, sweep_hints  # loads the keys of plans, which is slow
 
             for line in [*robot_hints(robot), *sweep_hints(self.sweep.spec, robot)]:
                 self.hooks.warn(f"hint: {line}")
@@ -150,7 +149,7 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
     from cspr_jax.sweep import executors
     from cspr_jax.sweep.tile import TileMap
 
-    tile_map = TileMap(job.sweep)  # refuses a hopeless sweep before anything is made
+    tile_map = TileMap(job.sweep)  # refuses a hopeless sweep before files are made
     if job.scheduler is not None:
         from cspr_jax.sweep.distributed import Scheduler
 
@@ -166,7 +165,7 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
 
 
 def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
-    """A sweep, checked without computing anything."""
+    """The sweep of a file or dictionary, checked; nothing is computed."""
     if not isinstance(source, Mapping):
         return read_sweep(Path(source))
     data = plain_values(source)
@@ -185,23 +184,23 @@ def run(
     tiles: TileRange | None = None,
     on_tile: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Compute a sweep into an HDF5 result; tiles that an earlier run has finished are kept.
+    """Compute a sweep into an HDF5 result; tiles that an earlier run finished are kept.
 
     Args:
-        given: path of a sweep file, or its content as a dictionary: parsed TOML, which may hold arrays in place of
-            lists. Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
+        given: path of a sweep file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
+            lists). Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
         directory: run directory; None: results/<sweep>-<first 12 digits of its identity>.
         workers: number of processes on this machine; above 1, a script must call this function under
             `if __name__ == "__main__":`.
-        scheduler: address of a dask.distributed scheduler, whose workers compute instead.
-        prune: whether to remove the files of finished tiles once the result is complete.
-        accept_environment_change: whether to resume although version, machine or libraries have changed.
-        tiles: first and end of the tiles to compute, for jobs that each have a directory, which `merge` joins; None:
-            all.
+        scheduler: address of a dask.distributed scheduler whose workers compute instead.
+        prune: whether to remove the files of tiles once the result is complete.
+        accept_environment_change: whether to resume even if version, machine or libraries have changed.
+        tiles: first and end of the range of tiles to compute, for jobs that each have a directory and that `merge`
+            joins; None: all tiles.
         on_tile: called after each tile with the numbers of finished and of all cells.
 
     Returns:
-        the path of the result; of the directory, where only some tiles were asked for.
+        the path of the result; if only some tiles were computed, of the directory.
 
     Raises:
         ConfigError: a mistake in the sweep, or too little space on the disk.
@@ -222,7 +221,7 @@ def run(
 
 
 def check_tiles(tiles: tuple[int, int] | None, count: int) -> None:
-    """Refuse a range of tiles that a sweep does not have; its end may lie beyond the last one."""
+    """Refuse a range of tiles that a sweep does not have; its end may be beyond the last tile."""
     if tiles is not None and not 0 <= tiles[0] < min(tiles[1], count):
         raise ConfigError("--tiles", f"{tiles[0]}:{tiles[1]}: must be FIRST:END within the {count} tiles, such as 0:8")
 
@@ -232,15 +231,15 @@ def merge(paths: PathNames, directory: str | Path, *, accept_environment_change:
     """Join maps into one result: parts of one map (`run(..., tiles=...)`), or maps that differ in one axis.
 
     Args:
-        paths: run directories and results; where they overlap, their cells must agree.
-        directory: run directory of the joined map; it can be verified, drawn and reported like any other.
-        accept_environment_change: whether to join what different versions or machines have computed.
+        paths: run directories and results; where maps overlap, their cells must agree.
+        directory: run directory of the joined map, which can be verified, drawn and reported like any other.
+        accept_environment_change: whether to join maps that different versions or machines have computed.
 
     Returns:
         the path of the result.
 
     Raises:
-        RefusedError: the maps do not fit together, or cells are missing; a line for each reason.
+        RefusedError: the maps do not fit together, or cells are missing; one line for each reason.
         StoreError: a file cannot be read or written.
     """
     return merged(paths, Path(directory), engine.Options(accept_environment_change, command=tuple(sys.argv)))
@@ -249,7 +248,7 @@ def merge(paths: PathNames, directory: str | Path, *, accept_environment_change:
 def merged(
     paths: Sequence[str | Path], directory: Path, options: engine.Options, hooks: engine.Hooks | None = None
 ) -> Path:
-    """As `merge`, with the options and hooks of a run."""
+    """Like `merge`, with options and hooks of a run."""
     from cspr_jax.sweep.merging import Merged, read_part
 
     parts = [Path(path) for path in paths]
@@ -262,17 +261,17 @@ def merged(
 
 @checked()
 def compute_sweep(given: File) -> xarray.Dataset:
-    """Compute a small sweep and keep no file; long sweeps take `run`, which can resume.
+    """Compute a small sweep without keeping files; use `run` for long sweeps, which can then resume.
 
     Args:
         given: as for `run`.
 
     Returns:
-        the result, as `open_result(...).to_xarray()` gives it.
+        the result, as `open_result(...).to_xarray()` returns it.
 
     Raises:
         ConfigError: a mistake in the sweep, or xarray is not installed.
-        CsprError: as `run` does.
+        CsprError: as for `run`.
     """
     labelled.need_xarray()
     with tempfile.TemporaryDirectory() as folder:
@@ -281,26 +280,26 @@ def compute_sweep(given: File) -> xarray.Dataset:
 
 @checked()
 def status(directory: str | Path) -> dict[str, Any]:
-    """Progress of a run, without changing it.
+    """Progress of a run, which is not changed.
 
     Returns:
         what `cspr status --json` prints: "identity", "tiles", "shards", "result" and more.
 
     Raises:
-        StoreError: the folder is no run directory.
+        StoreError: the folder is not a run directory.
     """
     return inspection.status(Path(directory))
 
 
 @checked()
 def verify(path: str | Path) -> dict[str, Any]:
-    """Reread and check all files of a run, or a result or motion file.
+    """Read and check all files of a run, or a result or motion file.
 
     Args:
         path: a run directory, or a file.
 
     Returns:
-        what `cspr verify --json` prints: counts, and "faults", one line each; none if nothing is damaged.
+        what `cspr verify --json` prints: counts, and "faults", one line each; there are none if nothing is damaged.
 
     Raises:
         StoreError: the path is neither a run directory nor a file.
@@ -310,17 +309,17 @@ def verify(path: str | Path) -> dict[str, Any]:
 
 @checked()
 def workspace_volume(result: ResultOrPath) -> WorkspaceVolume:
-    """Volume of the workspace of a map, or its area if the map is a section.
+    """Volume of the workspace in a map, or its area if the map is a section.
 
     Args:
-        result: result of a map with verdicts: its file, or a value of `open_result` or `compute_sweep`.
+        result: result of a map with verdicts: its file, or what `open_result` or `compute_sweep` returns.
 
     Returns:
-        the volume; its arrays run over the axes that are not coordinates of positions, () if there are none.
+        the volume; its arrays run over the axes that are not coordinates of positions, or are () without such axes.
 
     Raises:
-        InputError: the result is no map, has no stored verdicts, or has a single position.
-        StoreError: the file is no result.
+        InputError: the result is not a map, has no stored verdicts, or has a single position.
+        StoreError: the file is not a result.
     """
     if isinstance(result, Result):
         return volume_of(result)

@@ -1,4 +1,4 @@
-"""Poses at rest from Python: which poses a robot can hold, how exactly, and which accelerations it can have there."""
+"""Poses at rest from Python: which ones a robot can hold, how exactly, and with which accelerations."""
 
 from __future__ import annotations
 
@@ -66,33 +66,33 @@ def workspace(  # noqa: PLR0913
     """Tell whether each of n poses is in the workspace of a robot, of any pattern on any number of cables.
 
     Args:
-        robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys are taken into account.
+        robot: point mass or body on at least as many cables as degrees of freedom; pulleys are taken into account.
         positions: (n, 3) positions of `point`, or of the joint, in the robot's axes, m; n >= 1.
-        orientations: (n, 4) unit quaternions, scalar first, from the orientation of the robot file; None: this one.
-        condition: "static": taut cables of any tension hold the weight; "wrench-feasible": tensions within limits
-            supply all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench.
-        tension_min: "wrench-feasible": smallest tension, () or (n_cables,) N; None: the robot's, else 0.
-        tension_max: "wrench-feasible": largest tension, () or (n_cables,) N, may be inf; None: the robot's, else none.
-        wrenches: "wrench-feasible": (k, dof) wrenches that the cables must supply, forces, N, then moments about the
-            mass centre, or the joint, N m, in the robot's axes; None: the wrench that holds the weight.
+        orientations: (n, 4) unit quaternions, scalar first, relative to that in the robot file; None: that one.
+        condition: "static": taut cables with any tensions hold the weight; "wrench-feasible": tensions within limits
+            supply all given wrenches; "wrench-closure": with large enough tensions cables resist every wrench.
+        tension_min: for "wrench-feasible": smallest tension, () or (n_cables,) N; None: the robot's, else 0.
+        tension_max: for "wrench-feasible": largest tension, () or (n_cables,) N, also inf; None: the robot's, or none.
+        wrenches: for "wrench-feasible": (k, dof) wrenches that cables must supply: forces, N, then moments about the
+            mass centre or the joint, N m, in the robot's axes; None: the wrench that holds the weight.
         wrench_box: (dof,) half widths of a box of wrenches about each of `wrenches`, N and N m.
         wrench_ellipsoid: (dof,) semi-axes of an ellipsoid of wrenches about each of `wrenches`, N and N m.
-        acceleration: radius of a ball of accelerations of the mass centre that the cables must give too, m/s^2.
-        capacity_length: "wrench-feasible": length that moments are divided by, m (any for a point mass). Margins are
-            then capacity margins: distances of the wrenches from the faces of the set that the cables can supply, N
+        acceleration: radius of a ball of accelerations of the mass centre that the cables must also supply, m/s^2.
+        capacity_length: for "wrench-feasible": length by which moments are divided, m (any for a point mass). Margins
+            are then capacity margins: distances of the wrenches from the faces of the set that the cables can supply, N
             (Guay et al. 2014; Ruiz et al. 2015).
-        precision: "float64", or "float32", which decides the poses that it can and leaves the others to float64, so
-            that verdicts are the same; margins of poses that it decides are good to some 1e-3 of the limits.
+        precision: "float64", or "float32", which decides the poses that it can and leaves the others to float64. So
+            verdicts are the same; margins of poses decided in float32 are accurate to some 1e-3 of the limits.
         point: point of a platform whose positions are given: "origin" of its axes, or "mass-centre"; None: the origin.
 
     Returns:
         verdicts, 0 inside, and margins.
 
     Raises:
-        InputError: the wrong kind of robot, or one on too many cables, an unknown condition, shapes that do not fit,
-            values that are not finite, quaternions that are not of unit length, orientations of a point mass,
-            moments of a rod, accelerations of a robot on a joint, limits or wrenches where the condition has none, or
-            limits that contradict each other.
+        InputError: the wrong kind of robot, too many cables, an unknown condition, shapes that do not fit, values that
+            are not finite, quaternions that are not of unit length, orientations of a point mass, moments of a rod,
+            accelerations of a robot on a joint, limits or wrenches for a condition without them, or contradictory
+            limits.
     """
     _check_kind(robot)
     check_cables(robot)
@@ -124,7 +124,7 @@ def _check_kind(robot) -> None:
 
 
 def _limits(robot, tension_min, tension_max) -> Limits:
-    if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be one number for each cable
+    if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be given for each cable
         allowed = f"a number > 0, or {robot.n_cables}: one a cable"
         tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
@@ -133,7 +133,7 @@ def _limits(robot, tension_min, tension_max) -> Limits:
 def _poses(
     robot, frame: Frame, positions: np.ndarray, orientations, point: str
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    # Positions of the mass centre, and quaternions, (n, 3) and (n, 4).
+    # Return positions of the mass centre, (n, 3), and quaternions, (n, 4).
     row = PATTERNS[robot.pattern]
     inner, turns = np.asarray(frame.inward(positions)), None
     if orientations is not None:
@@ -151,9 +151,9 @@ class Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths at n positions, Machines 11 (2), 2023, 224, (7).
 
     Fields:
-        positions: (n, 3) positions as they were given, in the robot's axes, m.
-        sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular pose.
-        sigma_r: (n,) largest rotation of a platform over the largest error, rad/m, with six independent errors; NaN for
+        positions: (n, 3) positions as given, in the robot's axes, m.
+        sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; inf at singular poses.
+        sigma_r: (n,) largest rotation of a platform over the largest error, rad/m, for six independent errors; NaN for
             a point mass.
     """
 
@@ -163,7 +163,7 @@ class Sensitivity:
 
     @checked()
     def errors(self, cable_error: CableErrors) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the errors of the pose, to first order.
+        """Bounds of the errors of the pose to first order.
 
         Args:
             cable_error: () or (n,) largest error of the length of a cable, m.
@@ -191,10 +191,10 @@ def sensitivity(
     """Sensitivities of a robot to errors of its cable lengths.
 
     Args:
-        robot: a point mass on three cables, or two in a plane, or a platform on six.
+        robot: point mass on three cables, or on two in a plane, or platform on six.
         positions: (n, 3) positions of `point`, in the robot's axes, m.
-        orientations: (n, 4) unit quaternions of a platform in the robot's axes, scalar first, from the reference
-            orientation, or from that of the robot file if the cables are parallel in three pairs there; None: no
+        orientations: (n, 4) unit quaternions of a platform in the robot's axes, scalar first, relative to the reference
+            orientation, or to that of the robot file if the cables are parallel in three pairs there; None: no
             rotation.
         point: point of a platform whose positions are given: "origin" of its axes, or "mass-centre"; None: the mass
             centre.
@@ -225,10 +225,10 @@ def sensitivity(
 
 @checked()
 def encoder_error(drum_radius: Positive, pulses: Positive) -> float:
-    """Error of a cable's length from the resolution of its winch's encoder, 2 pi r / pulses.
+    """Error of a cable length due to the resolution of the winch's encoder, 2 pi r / pulses.
 
     Args:
-        drum_radius: radius of the drum or pulley that the cable is wound on, m.
+        drum_radius: radius of the drum or pulley on which the cable is wound, m.
         pulses: pulses of the encoder per turn of the drum.
 
     Returns:
@@ -242,15 +242,15 @@ def encoder_error(drum_radius: Positive, pulses: Positive) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class AvailableAccelerations:
-    """Accelerations that the cables of a point mass can give at n positions, as faces; float64.
+    """Accelerations that the cables of a point mass can supply at n positions, as faces; float64.
 
     An acceleration a is feasible where `normals @ a >= offsets`.
 
     Fields:
-        positions: (n, 3) in the robot's axes, m.
-        normals: (n, n_faces, 3) unit normals that point inside, in the robot's axes; 0 for a face that bounds nothing.
-        offsets: (n, n_faces) m/s^2; -inf for a face that bounds nothing.
-        cables: (n_faces, dof - 1) numbers of the cables that are parallel to the face, from 0 on.
+        positions: (n, 3) positions in the robot's axes, m.
+        normals: (n, n_faces, 3) unit normals, pointing inside, in the robot's axes; 0 for a face that bounds nothing.
+        offsets: (n, n_faces) offsets of the faces, m/s^2; -inf for a face that bounds nothing.
+        cables: (n_faces, dof - 1) indices, from 0, of the cables that are parallel to the face.
         of_largest: (n, n_faces) whether a cable has its largest tension on the face.
     """
 
@@ -266,14 +266,14 @@ class AvailableAccelerations:
 
     @checked()
     def margin(self, accelerations: VectorOrVectors) -> np.ndarray:
-        """Distance of accelerations from the nearest face.
+        """Distances of accelerations from the nearest face.
 
         Args:
-            accelerations: (3,) for all positions, or (n, 3), one for each, in the robot's axes, m/s^2.
+            accelerations: (3,) for all positions, or (n, 3), one for each position, in the robot's axes, m/s^2.
 
         Returns:
-            (n,) m/s^2: positive where the acceleration is feasible, inf where nothing bounds it; negative where it is
-            not, and then at least minus its distance from the feasible ones.
+            (n,) m/s^2: positive if the acceleration is feasible, inf if nothing bounds it; negative if it is not,
+            and then at least minus its distance from the feasible ones.
 
         Raises:
             InputError: the wrong shape, or not finite.
@@ -288,7 +288,7 @@ class AvailableAccelerations:
             accelerations: as for `margin`.
 
         Returns:
-            (n,) flags of `Verdict`; 0 is feasible. A margin within 1e-9 of gravity, or of its rounding, is undecided,
+            (n,) flags of `Verdict`; 0 if feasible. Margins within 1e-9 of gravity, or within rounding, are undecided,
             unless limits may be touched.
 
         Raises:
@@ -314,11 +314,11 @@ class AvailableAccelerations:
 def available_accelerations(
     robot: PointMassRobot, positions: Points, *, tension_min: Tensions = None, tension_max: Tensions = None
 ) -> AvailableAccelerations:
-    """Feasible accelerations of a point mass on any number of cables, Boralugoda (2) to (6) and beyond.
+    """Feasible accelerations of a point mass on any number of cables, Boralugoda (2) to (6) and their extension.
 
     Args:
-        robot: a point mass in space or in a plane.
-        positions: (n, 3) in the robot's axes, m.
+        robot: point mass in space or in a plane.
+        positions: (n, 3) positions in the robot's axes, m.
         tension_min: smallest tension, () or (n_cables,) N; None: the robot's, else 0.
         tension_max: largest tension, () or (n_cables,) N; None: the robot's, else none.
 

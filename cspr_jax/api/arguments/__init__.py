@@ -1,1 +1,1 @@
-"""Arguments of public functions: their checks, and how kernels take them."""
+"""Arguments of public functions: their checks, and their conversion for kernels."""

@@ -1,4 +1,4 @@
-"""Keys of plans for robots and limits that are made in Python."""
+"""Keys of plans from robots and limits that are made in Python."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,12 +17,12 @@ from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
-# Errors name this in place of a file where there is none.
+# Errors name this instead of a file if there is no file.
 NAME = Path("motion")
 
 
 def robot_table(robot: AnyRobot) -> dict[str, Any]:
-    """Keys of a robot file for a robot made in Python."""
+    """Keys of the robot file of a robot made in Python."""
     table: dict[str, Any] = {"name": robot.name or "robot", "pattern": robot.pattern, "z_axis": robot.z_axis}
     table |= {name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter")}
     if isinstance(robot, PlatformRobot):
@@ -44,7 +44,7 @@ def robot_table(robot: AnyRobot) -> dict[str, Any]:
 def check_keys(
     robot: AnyRobot | str | Path, limits: Limits | Mapping[str, Any] | None, **settings: Any
 ) -> dict[str, Any]:
-    """Keys of the plan of a motion that is checked."""
+    """Keys of a plan whose motion is to be checked."""
     spec: dict[str, Any] = {"schema": 1, "family": "spline", "motion": str(NAME)}
     spec["robot"] = str(robot) if isinstance(robot, str | Path) else robot_table(robot)
     return spec | {name: value for name, value in settings.items() if value is not None} | _limit_keys(limits)

@@ -1,7 +1,7 @@
 """Checks of the arguments of public functions, by the types in their signatures, before anything runs.
 
-Numbers, words and paths have their rules in `errors.arguments`, objects of the package here. Conditions on several
-arguments, a robot or a file are checked by the function itself.
+`errors.arguments` has the rules of numbers, words and paths, this module those of objects of the package. Conditions on
+several arguments, a robot or a file are checked by the function itself.
 """
 
 import functools
@@ -45,11 +45,11 @@ def checked(
     """Make a function check its arguments first.
 
     Args:
-        traced: whether jax may trace arguments of the function.
-        motion: function of a single motion, which jax differentiates instead.
-        instead: what it differentiates if there is none.
-        name: public name, if it is not that of the function.
-        module: public module, likewise.
+        traced: whether jax may trace the arguments of the function.
+        motion: function of a single motion that jax can differentiate, which errors recommend; "" without one.
+        instead: what errors recommend without such a function.
+        name: public name, if the function has another one.
+        module: public module, if the function is in another one.
 
     Returns:
         a decorator.
@@ -66,7 +66,7 @@ def checked(
                 bound = signature.bind(*arguments, **keywords).arguments
             except TypeError:
                 ask_about_keywords(own_name, keywords, signature.parameters)
-                return function(*arguments, **keywords)  # which says what is missing, or too many, in its own name
+                return function(*arguments, **keywords)  # raises the usual TypeError, with the function's own name
             for key, rule in rules().items():
                 if key not in bound:
                     continue
@@ -88,14 +88,14 @@ def checked(
 
 def rules_of(function: Callable[..., Any]) -> dict[str, Rule]:
     """Rules of the arguments of a function."""
-    # Only types of arguments are evaluated: those of results may be known to type checkers alone.
+    # Evaluate only the types of arguments: types of results may exist for type checkers alone.
     hints = {key: kind for key, kind in inspect.get_annotations(function).items() if key != "return"}
     scope = inspect.unwrap(function).__globals__
     return {key: rule_of(eval(kind, scope) if isinstance(kind, str) else kind) for key, kind in hints.items()}
 
 
 def rule_of(kind: Any) -> Rule:
-    """Rule of a type: that of `Annotated`, that of the last member of a union, else the one for its name."""
+    """Rule of a type: that in `Annotated`, else of the last member of a union, else by the name of the type."""
     if get_origin(kind) in (Union, types.UnionType):
         parts = [part for part in get_args(kind) if part is not type(None)]
         return or_none(rule_of(parts[-1])) if len(parts) < len(get_args(kind)) else rule_of(parts[-1])
@@ -107,7 +107,7 @@ def rule_of(kind: Any) -> Rule:
 
 
 def _record(kind: Kind, names: Iterable[str]) -> Rule:
-    # An object whose attributes of these names are real numbers.
+    # Return a rule for objects whose attributes of these names are real numbers.
     field = Choice(Numbers("real numbers", None, infinite=True, traced=True), (None,))
 
     def check(key: str, value: Any) -> None:
@@ -131,7 +131,7 @@ def _limits_or_spec(key: str, value: Any) -> None:
 
 
 def _result(key: str, value: Any) -> None:
-    if not hasattr(value, "data_vars"):  # of xarray
+    if not hasattr(value, "data_vars"):  # not a Dataset of xarray
         _RESULT(key, value)
 
 
@@ -144,7 +144,7 @@ def _results(key: str, value: Any) -> None:
 
 
 def _source(key: str, value: Any) -> None:
-    # Times, or what has a motion in itself: a file, a spline, a function.
+    # Accept times, or something with a motion in itself: a file, a spline, a function.
     if not (isinstance(value, str | os.PathLike) or callable(value) or hasattr(value, "state")):
         rule_of_times("(n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
 
@@ -159,7 +159,7 @@ _ROBOT = Kind(
 _IN_ROBOTS = ("base_points", "limits")
 AMPLITUDE = Kind("the name of an amplitude function, or one of amplitude(...)", (str,), ("coefficients", "knots"))
 
-# Rules by the names of types, so that none is imported for this.
+# Rules by names of types, so that none of the types is imported for this.
 OF_TYPES: dict[str, Rule] = {
     "Amplitude": AMPLITUDE,
     "Callable": Kind("a function", has=("__call__",)),

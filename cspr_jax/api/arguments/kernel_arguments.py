@@ -1,4 +1,4 @@
-"""Arguments of the functions from Python as kernels take them, and motions of many answers."""
+"""Conversion of arguments of public functions for kernels, and batches of motions from answers."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def check_point_mass(robot: Any) -> None:
 
 
 def check_in_plane(key: str, points: Float[np.ndarray, "n 3"], *, is_planar: bool) -> None:
-    """Refuse points beside the plane of a planar robot."""
+    """Refuse points outside the plane of a planar robot."""
     if is_planar and points[:, 1].any():
         raise InputError(key, "y not 0", "y = 0: the plane of a planar robot")
 
 
 def starts_and_ends(robot: Any, start, targets) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    """Ends of many motions of a point mass."""
+    """Starts and ends of many motions of a point mass, (n, 3) each."""
     check_point_mass(robot)
     ends, starts = points_of("targets", targets), points_of("start", np.atleast_2d(np.asarray(start, float)))
     if len(starts) not in (1, len(ends)):
@@ -50,7 +50,7 @@ def starts_and_ends(robot: Any, start, targets) -> tuple[Float[np.ndarray, "n 3"
 
 
 def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
-    """Amplitude function, from its name or as it is."""
+    """Amplitude function, given by its name or as a function."""
     try:
         function = named(amplitude) if isinstance(amplitude, str) else amplitude
     except InputError as error:
@@ -71,7 +71,7 @@ def warn_of_rest(robot: Any, key: str, position: Any, z0: Any, cure: str) -> Non
     if np.shape(position) == (3,) and np.shape(z0) == ():
         line = almost_at_rest(key, np.asarray(position, float).tolist(), float(z0), robot, cure)
         if line:
-            warnings.warn(line, stacklevel=5)  # above the check of arguments
+            warnings.warn(line, stacklevel=5)  # blames the caller, above the check of arguments
 
 
 def kernel_problem(
@@ -83,32 +83,32 @@ def kernel_problem(
     families: tuple[str, ...] = (),
     any_cables: bool = False,
 ) -> tuple[Problem, Frame]:
-    """Robot, limits and amplitude function, as the kernels take them."""
+    """Robot, limits and amplitude function in the form for kernels."""
     function = amplitude_of(amplitude, free_end=free_end)
     (check_moved if any_cables else check_determined)(robot)
     prepared_robot, frame = prepared(robot)
-    # The same rule as `build.robots.is_redundant_platform`.
+    # Apply the same rule as `build.robots.is_redundant_platform`.
     any_tensions = isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof
     limit_values = limits_over(robot, limits, any_tensions=any_tensions, families=families)
     return Problem(prepared_robot, limit_values, function), frame
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:
-    """Motions of answers, as one motion whose leaves all have a leading dimension, so that `jax.vmap` takes it."""
+    """Motions of answers as one motion with a leading dimension in all leaves, for `jax.vmap`."""
     count = len(answers.tried_arcs)
     shared = jax.tree.map(lambda x: np.broadcast_to(x, (count, *np.shape(x))), (problem.amplitude, frame))
     return Placed(kind(segments, shared[0], answers.tried_arcs.astype(float), *more), shared[1])
 
 
 def depths(z0, count: int) -> Float[np.ndarray, "count"]:
-    """Depths of P0."""
+    """Depths of P0, one for each motion."""
     if np.shape(z0) not in ((), (count,)):
         raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({count},) of them")
     return np.broadcast_to(DEPTHS.array("z0", z0), (count,)).copy()
 
 
 def release_ranges(x, y, z) -> list:
-    """Ranges of the position of release."""
+    """Ranges of the coordinates of the position of release."""
     for name, values in {"release_x": x, "release_y": y, "release_z": z}.items():
         if values is not None and not values[0] <= values[1]:
             raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
@@ -116,7 +116,7 @@ def release_ranges(x, y, z) -> list:
 
 
 def quaternions(key: str, orientations, count: int) -> Float[np.ndarray, "count 4"]:
-    """Orientations."""
+    """Orientations as unit quaternions; refuses other shapes."""
     if orientations is None:
         return np.tile(IDENTITY, (count, 1))
     values = np.asarray(orientations, float)
@@ -126,5 +126,5 @@ def quaternions(key: str, orientations, count: int) -> Float[np.ndarray, "count 
 
 
 def points_of(key: str, points) -> Float[np.ndarray, "n 3"]:
-    """Points."""
+    """Points as an array; refuses other shapes."""
     return POINTS.array(key, points)

@@ -1,4 +1,4 @@
-"""Bezier segments of point masses from Python: one motion in pure jax, verdicts, durations and launches of many."""
+"""Bezier segments of point masses from Python: single motions in pure jax; verdicts, durations, launches of many."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class BezierVerdicts(Columns):
     """Verdicts of n Bezier segments, (n,) each.
 
     Fields:
-        verdict: flags of `Verdict`; 0: proved feasible.
-        margin: smallest pseudotension over its value at rest in P0, or smallest depth below the spools over the depth
-            of the start, whichever is less; on more cables than degrees of freedom the smallest distance that all
+        verdict: flags of `Verdict`; 0 if proved feasible.
+        margin: the smaller of the smallest pseudotension over its value at rest in P0, and the smallest depth below the
+            spools over the depth of the start; on more cables than degrees of freedom, the smallest distance that all
             tensions can keep from their limits, N.
-        margin_bound: proved lower bound of the margin: the margin less its rounding error, or by the proof of motions
-            of redundant cables.
-        limit_margin: smallest slack of the limits on the segment, without a unit; inf without limits.
+        margin_bound: proved lower bound of the margin: the margin less its rounding error; for redundant cables, by the
+            proof of the motion.
+        limit_margin: smallest slack of the limits on the segment, dimensionless; inf without limits.
     """
 
     verdict: np.ndarray
@@ -78,7 +78,7 @@ def bezier(
     """Motion along a Bezier curve of the second order from rest to rest, launch paper (9), (13).
 
     Args:
-        robot: a point mass on any number of cables.
+        robot: point mass on any number of cables.
         start: (3,) first control point in the robot's axes, m.
         control_point: (3,) second control point, m.
         end: (3,) third control point, m.
@@ -88,7 +88,7 @@ def bezier(
         the motion, in the robot's axes.
 
     Raises:
-        InputError: the wrong kind of robot.
+        InputError: the robot has the wrong kind.
     """
     check_point_mass(robot)
     prepared_robot, frame = prepared(robot)
@@ -111,12 +111,12 @@ def bezier_verdicts(
     """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane; or on more.
+        robot: point mass on three cables, or on two in a plane; or on more.
         starts: (n, 3) first control points in the robot's axes, m.
         control_points: (n, 3) second control points, m.
         ends: (n, 3) third control points, m.
-        durations: (n,) s, positive.
-        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        durations: (n,) positive, s.
+        limits: replace those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
         the verdicts.
@@ -148,19 +148,20 @@ def bezier_durations(
 ) -> list[np.ndarray]:
     """Durations of Bezier segments that keep every cable taut below the spools, by roots of polynomials.
 
-    On more cables than degrees of freedom the durations are one interval, whose ends are proved, wherever spools are.
+    On more cables than degrees of freedom, the durations are one interval with proved ends; the spools may be anywhere.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane; or on more.
+        robot: point mass on three cables, or on two in a plane; or on more.
         starts: (n, 3) first control points in the robot's axes, m.
         ends: (n, 3) third control points, m.
-        control_points: (n, 3) second control points, m; None: they follow from the accelerations, (15).
+        control_points: (n, 3) second control points, m; None: the accelerations determine them, (15).
         accelerations: (n, 3) accelerations at the starts, in the robot's axes, m/s^2; None: zero. On more cables than
-            degrees of freedom they must be zero: a curve that depends on its duration may have any set of durations.
+            degrees of freedom they must be zero: otherwise the curve depends on the duration, and any set of durations
+            may be feasible.
 
     Returns:
-        for each segment (n_intervals, 2) s: both ends of each interval of durations that are proved feasible; the last
-        end is inf where every longer duration is feasible, the first 0 where redundant cables give any acceleration.
+        for each segment (n_intervals, 2) s: the ends of each interval of durations that are proved feasible; the last
+        end is inf if all longer durations are feasible, the first 0 if redundant cables can give any acceleration.
 
     Raises:
         InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, both control points and
@@ -202,17 +203,17 @@ def launch_range(
     """Launches of least speed to landing points, by one Bezier segment from rest, launch paper (26) and (29).
 
     Args:
-        robot: a point mass on three cables, or on two in a plane; or on more.
+        robot: point mass on three cables, or on two in a plane; or on more.
         targets: (n, 3) landing points in the robot's axes, m.
         start: (3,) or (n, 3) positions where the segments start at rest, in the robot's axes, m.
-        release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
-            the spools.
-        release_y: least and largest y of the release, m; None: as for x.
-        release_z: least and largest z of the release, m; None: from the centroid down to four times the robot's size
+        release_x: smallest and largest x of the release, m; None: twice the robot's radius to each side of the centroid
+            of the spools.
+        release_y: smallest and largest y of the release, m; None: as for x.
+        release_z: smallest and largest z of the release, m; None: from the centroid to four times the robot's radius
             below it.
-        max_duration: longest duration tried, s; None: 40 times the root of the robot's size over gravity.
-        population: launches that the search improves, at least 16; twice as many take four times as long.
-        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        max_duration: longest duration tried, s; None: 40 times the root of the robot's radius over gravity.
+        population: number of launches that the search improves, at least 16; twice as many take four times as long.
+        limits: replace those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
         the launches, in the robot's axes. Launches found are proved feasible; that there are no others is not proved.

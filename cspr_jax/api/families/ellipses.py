@@ -1,4 +1,4 @@
-"""Harmonic ellipses of point masses from Python: one motion, and frequencies and margins of many by formulas."""
+"""Harmonic ellipses of point masses from Python: single motions, and frequencies and margins of many by formulas."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ def ellipse(
     turns: Turns = 1.0,
     limits: Limits | None = None,
 ) -> Placed[EllipseMotion]:
-    """Motion centre + a cos(angle) + b sin(angle) whose angle grows evenly.
+    """Motion centre + a cos(angle) + b sin(angle) at a constant angular rate.
 
     Args:
-        robot: a point mass on any number of cables.
-        centre: (3,) in the robot's axes, m.
-        a: (3,) from the centre to the point at the angle 0, m.
-        b: (3,) from the centre to the point a quarter of a turn later, m; zeros: to and fro along a line.
-        frequency: () rad/s, or "natural", "best" (largest margin), "fastest" or "slowest" (within all limits).
+        robot: point mass on any number of cables.
+        centre: (3,) centre in the robot's axes, m.
+        a: (3,) vector from the centre to the point at the angle 0, m.
+        b: (3,) vector from the centre to the point a quarter of a turn later, m; zeros for an oscillation along a line.
+        frequency: () rad/s, or "natural", "best" (of largest margin), "fastest" or "slowest" (within all limits).
         phase: () angle at the start, rad.
         turns: () number of turns.
-        limits: override those of the robot, for "fastest" and "slowest"; None: those of the robot.
+        limits: replace those of the robot, for "fastest" and "slowest"; None: those of the robot.
 
     Returns:
         the motion, in the robot's axes; jax may trace all arguments except a frequency in words.
 
     Raises:
-        InputError: the wrong kind of robot, y not 0 on a planar one, or a word for which there is no frequency.
+        InputError: the robot has the wrong kind, y is not 0 on a planar one, or no frequency fits a word.
     """
     _check_robot(robot, centre=centre, a=a, b=b)
     prepared_robot, frame = prepared(robot, pulleys=True)
@@ -72,14 +72,14 @@ def ellipse_frequencies(robot: PointMassRobot, centres: Points, a: PointOrPoints
     """Frequencies at which all cables stay taut on ellipses, by formulas.
 
     Args:
-        robot: a point mass on spools in one plane, on two or more cables.
-        centres: (n, 3) in the robot's axes, m.
-        a: (3,) or (n, 3) from the centre to the point at the angle 0, m.
-        b: (3,) or (n, 3) from the centre to the point a quarter of a turn later, m.
+        robot: point mass on two or more cables, with all spools in one plane.
+        centres: (n, 3) centres in the robot's axes, m.
+        a: (3,) or (n, 3) vectors from the centre to the point at the angle 0, m.
+        b: (3,) or (n, 3) vectors from the centre to the point a quarter of a turn later, m.
 
     Returns:
-        for each ellipse its open intervals, (k, 2) rad/s: k is 0 where no frequency is feasible, else 1; the upper end
-        is inf where nothing bounds it.
+        for each ellipse its open intervals, (k, 2) rad/s: k is 0 if no frequency is feasible, else 1; the upper end is
+        inf if nothing bounds it.
 
     Raises:
         InputError: the wrong kind of robot, spools in several planes, pulleys, y not 0 on a planar robot, or shapes
@@ -98,18 +98,18 @@ def ellipse_frequencies(robot: PointMassRobot, centres: Points, a: PointOrPoints
 def ellipse_margins(
     robot: PointMassRobot, centres: Points, a: PointOrPoints, b: PointOrPoints, frequencies: Frequencies
 ) -> np.ndarray:
-    """Margins of motions on ellipses, by formulas: positive exactly where all cables stay taut.
+    """Margins of motions on ellipses, by formulas: positive exactly if all cables stay taut.
 
     Args:
-        robot: a point mass on spools in one plane, on two or more cables.
-        centres: (n, 3) in the robot's axes, m.
-        a: (3,) or (n, 3) from the centre to the point at the angle 0, m.
-        b: (3,) or (n, 3) from the centre to the point a quarter of a turn later, m.
+        robot: point mass on two or more cables, with all spools in one plane.
+        centres: (n, 3) centres in the robot's axes, m.
+        a: (3,) or (n, 3) vectors from the centre to the point at the angle 0, m.
+        b: (3,) or (n, 3) vectors from the centre to the point a quarter of a turn later, m.
         frequencies: () or (n,) rad/s.
 
     Returns:
-        (n,) smallest normalised pseudotension, which at rest below the centroid of the spools is 1; or smallest depth
-        over that of the centre.
+        (n,) the smaller of the smallest normalised pseudotension, which is 1 at rest below the centroid of the spools,
+        and the smallest depth over that of the centre.
 
     Raises:
         InputError: as for `ellipse_frequencies`.

@@ -1,4 +1,4 @@
-"""Straight lines of point masses from Python: one motion in pure jax, and least durations of many."""
+"""Straight lines of point masses from Python: single motions in pure jax, and least durations of many."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def straight_line(
     """Motion along a straight line from rest to rest, Boralugoda (7) to (9) and Table 3.2.
 
     Args:
-        robot: a point mass on any number of cables.
+        robot: point mass on any number of cables.
         start: (3,) start point in the robot's axes, m.
         end: (3,) end point in the robot's axes, m.
         duration: () duration T, s.
         law: "s-curve", "quintic" or "cubic".
-        acceleration_time: () time of acceleration p of the S-curve, s; None: half of the duration.
+        acceleration_time: () time p for which the S-curve accelerates, s; None: half of the duration.
 
     Returns:
         the motion, in the robot's axes.
@@ -67,18 +67,18 @@ def least_time(
     max_acceleration: Positive | None = None,
     limits: Limits | None = None,
 ) -> LeastTimes:
-    """Least durations along straight lines from rest to rest: of the S-model, and of any motion.
+    """Least durations along straight lines from rest to rest: of the S-model, and of any motion along the line.
 
     Args:
-        robot: a point mass on any number of cables.
+        robot: point mass on any number of cables.
         targets: (n, 3) end points in the robot's axes, m.
         start: (3,) or (n, 3) start points in the robot's axes, m.
         max_acceleration: largest magnitude of the acceleration, m/s^2; None: only taut cables bound it.
-        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        limits: replace those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
-        the answers; verdicts of feasible ones are proved. With limits, or with spools that are not in one plane, the
-        least duration is found by a search.
+        the answers; feasible ones are proved. With limits, or if the spools are not in one plane, the least duration
+        is found by a search.
 
     Raises:
         InputError: the wrong kind of robot, limits that contradict each other, shapes that do not fit, values that are

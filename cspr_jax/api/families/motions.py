@@ -1,7 +1,7 @@
-"""One motion from Python: pure jax, in the axes of the robot, to be jitted, vmapped and differentiated.
+"""Single motions from Python: pure jax, in the axes of the robot, to be jitted, vmapped and differentiated.
 
-Motions and margins here have the precision that jax is set to: call `jax.config.update("jax_enable_x64", True)` for
-float64, as searches use whatever jax is set to.
+Motions and margins have the precision that jax is set to: call `jax.config.update("jax_enable_x64", True)` for float64.
+Searches use float64 in any case.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
 from cspr_jax.robots.statics.kernel_axes import centred, prepared
 
 amplitude = checked(name="amplitude", module=__name__)(named)
-# Compiled whole: XLA would compile each of their operations by itself.
+# Compile all operations together: XLA would compile each of them by itself.
 _SLACKS = jax.jit(motion_slacks.slacks)
 _MARGIN = jax.jit(motion_slacks.sampled_margin, static_argnames="samples")
 
@@ -67,9 +67,9 @@ def make_problem(
     """Problem for `slacks` and `sampled_margin`: robot, limits and amplitude function.
 
     Args:
-        robot: a robot on as many cables as degrees of freedom.
-        amplitude: name of an amplitude function, or the function.
-        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        robot: robot on as many cables as degrees of freedom.
+        amplitude: name of an amplitude function, or the function itself.
+        limits: replace those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
         the problem.
@@ -93,14 +93,14 @@ def hypocycloid(
     """Standard hypocycloid of a point mass between two points, thesis chapter 2.
 
     Args:
-        robot: a point mass on three cables.
-        start: (3,) start point in the robot's axes, m; None: at rest in P0. Near P0 its direction from P0 decides the
-            motion, and gradients grow as one over the distance: unless jax traces it, a start within 1e-3 m or 1e-3 z0
-            of P0, but not at rest, gives a warning.
+        robot: point mass on three cables.
+        start: (3,) start point in the robot's axes, m; None: at rest in P0. Near P0 the motion depends on the direction
+            from P0, and gradients grow as the inverse of the distance: a start within 1e-3 m or 1e-3 z0 of P0, but not
+            at rest, gives a warning unless jax traces it.
         end: (3,) end point in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
-        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (2.49).
 
     Returns:
         the motion, in the robot's axes.
@@ -127,11 +127,11 @@ def transition(
     """Transition of a point mass from rest in P0 to a target, thesis chapter 1.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: point mass on three cables, or on two in a plane.
         target: (3,) target in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
         oscillations: () number n of oscillations.
-        amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (1.27) and (1.28).
 
     Returns:
         the motion, in the robot's axes.
@@ -162,14 +162,14 @@ def platform_motion(
     """Motion of a platform between two poses, thesis chapter 3.
 
     Args:
-        robot: a platform on six cables or more; jax may trace its spools, but not its platform points.
-        start: (3,) start of the mass centre in the robot's axes, m; None: P0. Near P0: as in `hypocycloid`.
+        robot: platform on six cables or more; jax may trace its spools, but not its platform points.
+        start: (3,) start of the mass centre in the robot's axes, m; None: P0. For a start near P0 see `hypocycloid`.
         end: (3,) end of the mass centre in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
-        orientations: (2, 4) unit quaternions at start and end, scalar first, from the reference orientation.
+        orientations: (2, 4) unit quaternions at start and end, scalar first, relative to the reference orientation.
         beta_hat: (2,) beta-hat at start and end, (3.81); -1 at rest.
-        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (2.49).
         variable: whether the position is a hypocycloid of variable amplitude (3.44), or a standard one.
 
     Returns:
@@ -203,26 +203,26 @@ def spline(
     """Motion through samples, as a piecewise polynomial in time.
 
     Args:
-        robot: a robot of any pattern, on any number of cables.
+        robot: robot of any pattern, on any number of cables.
         times: (n,) increasing, s; jax may trace positions, velocities and accelerations, but no other argument.
-        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        positions: (n, 3) positions of the mass centre, in the robot's axes, m.
         quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
         velocities: (n, 3) m/s, for Hermite pieces.
-        accelerations: (n, 3) m/s^2, likewise.
-        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" with velocities, "cubic" without.
+        accelerations: (n, 3) m/s^2, for Hermite pieces.
+        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" if there are velocities, else "cubic".
         ends: "rest", "natural" or "periodic"; None: "rest".
 
     Returns:
-        the motion, in the robot's axes; orientations of its states count from the reference orientation.
+        the motion, in the robot's axes; orientations of its states are relative to the reference orientation.
 
     Raises:
-        InputError: samples that make no motion.
+        InputError: samples that do not define a motion.
     """
     samples = [array for array in (positions, velocities, accelerations) if array is not None]
     options = {"interpolation": interpolation, "ends": ends}
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(samples)):
         return _spline(robot, times, quaternions, samples, **options)
-    # Orientations and knots do not depend on the traced arrays, and coefficients are linear in these.
+    # Orientations and knots do not depend on traced arrays, and coefficients are linear in them.
     arrays = [jnp.asarray(array, float) for array in samples]
     placed = _spline(robot, times, quaternions, [np.zeros(array.shape) for array in arrays], **options)
     kind = interpolation or ("cubic" if velocities is None else "hermite")
@@ -244,17 +244,17 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     """Tensions of the cables in a state of motion.
 
     Args:
-        robot: a platform or a point mass.
-        state: state in the robot's axes, as motions give it.
+        robot: platform or point mass.
+        state: state of a motion, in the robot's axes.
         rule: rule that chooses the tensions of redundant cables: "centred", "least-norm", "closed-form",
             "improved-closed-form" or "p-norm".
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push. The rule chooses the tensions of
-        redundant cables by the robot's limits; where it finds none within them, they are those of least norm.
+        (n_cables,) in cable order, N; negative if a cable would have to push. For redundant cables the rule chooses
+        tensions within the robot's limits; if it finds none, they are those of least norm.
 
     Raises:
-        InputError: an unknown rule, or a rule that needs a largest tension of every cable, which the robot lacks.
+        InputError: an unknown rule, or a rule that needs a largest tension of every cable on a robot without them.
     """
     prepared_robot, frame = prepared(robot, pulleys=True)
     if rule not in TENSION_RULES:
@@ -266,7 +266,7 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
 
 
 def _is_finite(numbers: Array) -> bool:
-    # Numbers that jax traces count as finite.
+    # Numbers that jax traces count as finite, since they have no values yet.
     return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 
@@ -275,12 +275,12 @@ def slacks(problem: Problem, motion: Motion, tau: Tau) -> Array:
     """Slacks of all criteria at one time of a motion: taut cables, determinant, depth, limits.
 
     Args:
-        problem: a problem of `make_problem`, with the motion's robot.
-        motion: a motion of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
+        problem: problem of `make_problem` with the motion's robot.
+        motion: motion of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
         tau: () normalised time in [0, 1].
 
     Returns:
-        (n_slacks,) without a unit, in the order of `motion.slacks`; all positive while the motion is feasible.
+        (n_slacks,) dimensionless, in the order of `motion.slacks`; all are positive while the motion is feasible.
     """
     return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
 
@@ -292,18 +292,18 @@ def sampled_margin(problem: Problem, motion: Motion, samples: Samples = 64) -> A
     If it is positive, no sample refutes the motion, but nothing is proved: searches prove feasibility.
 
     Args:
-        problem: a problem of `make_problem`, with the motion's robot.
+        problem: problem of `make_problem` with the motion's robot.
         motion: as in `slacks`.
-        samples: number of intervals between the times, ends included.
+        samples: number of intervals between the times, which include both ends.
 
     Returns:
-        () without a unit.
+        () dimensionless.
     """
     return _MARGIN(problem, _inner(motion), samples=samples)
 
 
 def _inward_positions(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
-    # In the kernels' axes. Nothing warns of positions that jax traces, since they have no values yet.
+    # Arguments are in the kernels' axes. Do not warn of positions that jax traces, since they have no values yet.
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((robot, start, end, z0))):
         if start is not None:
             warn_of_rest(robot, "start", start, z0, "start = None")

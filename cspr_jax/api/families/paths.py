@@ -1,4 +1,4 @@
-"""Least times along many paths of one robot from Python."""
+"""Least times along many paths for one robot, from Python."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ class LeastTimePaths(Columns):
     """The fastest motions along n paths of one robot.
 
     Fields:
-        verdict: (n,) `Verdict` flags; 0 is feasible, proved.
+        verdict: (n,) `Verdict` flags; 0 if proved feasible.
         duration: (n,) s; inf where no motion is proved feasible.
-        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path, with the same
-            stops, s; NaN where none is known.
+        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path with the same stops, s;
+            NaN if none is found.
         margin: (n,) smallest distance of a tension from its limits, N.
         margin_bound: (n,) proved lower bound of the margin, N.
         motions: n motions in the axes of the robot, slow ones where none is feasible.
-        coordinates: for each path the coordinates of its nodes, m; each section begins again at 0.
-        speeds: the path speeds there, m/s; NaN where there is no motion.
+        coordinates: for each path the coordinates of its nodes, m; each section starts again at 0.
+        speeds: for each path the path speeds at its nodes, m/s; NaN if there is no motion.
     """
 
     verdict: np.ndarray
@@ -59,7 +59,7 @@ class LeastTimePaths(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether there is a motion along each path that is proved feasible, (n,)."""
+        """Tell along which paths a motion is proved feasible, (n,)."""
         return self.verdict == 0
 
 
@@ -76,24 +76,24 @@ def least_time_paths(
     ramp_time: RampTime = 0.0,
     limits: LimitsOrSpec = None,
 ) -> LeastTimePaths:
-    """Run along many paths in the least time that the limits allow, each from zero speed to zero speed.
+    """Find motions along many paths in the least time that the limits allow, from rest to rest.
 
     Args:
-        robot: a robot, the name of one of the catalogue, or the path of a robot file.
+        robot: a robot, a name in the catalogue, or the path of a robot file.
         paths: n arrays (k, 3) of points of the mass centre, in the axes of the robot, m; or one array (n, k, 3).
         quaternions: n arrays (k, 4) of orientations at the points, scalar first; None: the platform's own axes.
-        kind: "line" (a stop at every point), "polyline", "cubic" or "quintic": how points are joined; None: "cubic".
-        corner: of polylines, "stop" or "blend"; None: "stop".
+        kind: how points are joined: "line" (a stop at every point), "polyline", "cubic" or "quintic"; None: "cubic".
+        corner: corners of polylines, "stop" or "blend"; None: "stop".
         blend_tolerance: largest distance of a blended path from the corner, m.
-        grid: number of cells into which each part of a path without a stop is cut.
-        ramp_time: time in which accelerations rise and fall, s; 0: they jump.
-        limits: override those of the robot, as for `check`.
+        grid: number of cells into which each part of a path between stops is divided.
+        ramp_time: time in which accelerations rise and fall, s; 0 if they may jump.
+        limits: replace those of the robot, as for `check`.
 
     Returns:
         the motions.
 
     Raises:
-        InputError: points that make no path, or an impossible argument.
+        InputError: points that do not define a path, or an impossible argument.
     """
     spec = checked_plan(check_keys(robot, limits), NAME)
     settings = {
@@ -131,7 +131,7 @@ def least_time_paths(
 
 
 def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternions: Any) -> list[Section]:
-    # Sections of one path, in the axes of the robot.
+    # Return the sections of one path, in the axes of the robot.
     positions = _numbers(f"paths[{i}]", points, 3)
     units = None
     if file.is_platform:
@@ -154,10 +154,10 @@ def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternion
 
 
 def _numbers(name: str, values: Any, width: int) -> np.ndarray:
-    # Rows of finite numbers.
+    # Return finite numbers as an array.
     try:
         array = np.asarray(values)
-    except ValueError as error:  # of rows of several lengths
+    except ValueError as error:  # rows of different lengths
         raise InputError(
             name, None, f"finite numbers of shape (k, {width})", problem="rows of several lengths"
         ) from error

@@ -1,4 +1,4 @@
-"""Searches of platforms from Python: poses and orientations in, answers out; see `api.families.searches`."""
+"""Searches of platforms from Python: from poses and orientations to answers; see `api.families.searches`."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ def minimum_pose_arcs(  # noqa: PLR0913
     """Smallest number of arcs of a platform to each of many poses, thesis chapter 3.
 
     Args:
-        robot: a platform on six cables or more. On more than six the margin is how far all tensions can keep from their
-            limits, over weight / n_cables; searches use samples, and the motion that they choose is proved.
+        robot: platform on six cables or more. On more than six the margin is the distance that all tensions can keep
+            from their limits, over weight / n_cables; searches use samples, and the chosen motion is proved.
         positions: (n, 3) positions of the mass centre in the robot's axes, m.
-        orientations: (n, 4) unit quaternions in the robot's axes, scalar first, from the reference orientation; None:
-            this one.
-        start: position (3,) and quaternion (4,) of the start, which has the preferred beta-hat; None: at rest in P0.
+        orientations: (n, 4) unit quaternions in the robot's axes, scalar first, relative to the reference orientation;
+            None: the reference orientation.
+        start: position (3,) and quaternion (4,) of the start, with the preferred beta-hat; None: at rest in P0.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
         beta_hat: beta-hat at the poses, or "preferred" (3.91); None: several are tried, the preferred one first.
-        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (2.49).
         limits: as in `minimum_arcs`.
         max_arcs: largest number of arcs tried.
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
@@ -74,7 +74,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
         the answers, (n,) each, proved.
 
     Raises:
-        InputError: as `minimum_arcs` does; quaternions that are not of unit length; a robot that is singular or slack
+        InputError: as for `minimum_arcs`; quaternions that are not of unit length; a robot that is singular or slack
             at rest.
     """
     if not isinstance(robot, PlatformRobot):
@@ -116,15 +116,15 @@ def accessible(
     """Accessible orientations at a position: free paths lead to them from the reference orientation, section 3.11.
 
     Args:
-        robot: a rigid platform; on more than six cables orientations are accessible by steps of full rank without
+        robot: rigid platform; on more than six cables, orientations are accessible by steps of full rank without
             contacts.
         place: (3,) position of the mass centre in the robot's axes, m.
         definition: how the set is sampled, as in [orientations] of a sweep file.
-        divisions: number of steps in pi: the step of the angles is pi / divisions; even, 4 to 128.
+        divisions: number of steps in pi: angles have the step pi / divisions; even, 4 to 128.
 
     Returns:
         `angles` (n, 3) of tilt and torsion in the cylindrical frame of the position, rad; `volume` (n,), the fraction
-        of SO(3) that each orientation stands for.
+        of SO(3) that each orientation represents.
 
     Raises:
         InputError: the wrong kind of robot, a position that is not finite, or a wrong definition or divisions.
@@ -149,12 +149,12 @@ def attainable(
     """Search the accessible orientations at a position that a motion from rest attains, section 3.12.3.
 
     Args:
-        robot: a rigid platform, as in `accessible`.
+        robot: rigid platform, as in `accessible`.
         place: (3,) position of the mass centre in the robot's axes, m.
         z0: depth of P0 below the centroid of the spools, m; None: the depth of the position.
         definition: as in `accessible`.
         divisions: as in `accessible`.
-        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (2.49).
         limits: as in `minimum_arcs`.
         max_arcs: largest number of arcs tried.
 
@@ -162,7 +162,7 @@ def attainable(
         the accessible orientations, and the answers (n,) of the motions to them.
 
     Raises:
-        InputError: as `accessible` and `minimum_arcs` do, or no orientation is accessible.
+        InputError: as for `accessible` and `minimum_arcs`, or no orientation is accessible.
     """
     problem, where = _of_place(robot, place, definition, divisions, amplitude, limits)
     with double_precision():

@@ -1,7 +1,7 @@
-"""Searches from Python: arrays of targets in, answers out.
+"""Searches from Python: from arrays of targets to answers.
 
-Searches work in the axes of the robot, and in float64 whatever jax is set to. Answers are NumPy arrays, which cannot be
-differentiated, and can make their motions.
+Searches use the axes of the robot, and float64 whatever precision jax is set to. Answers are NumPy arrays, which cannot
+be differentiated; they can make their motions.
 """
 
 from __future__ import annotations
@@ -40,29 +40,29 @@ class WithMotions:
     """Answers that can make their motions.
 
     Fields:
-        make: makes the motions of answers; a function of a module, bound to its arguments, so that answers can be
-            pickled and copied.
-        problem: problem that was searched.
+        make: function that makes the motions of answers; it is a function of a module, bound to its arguments, so that
+            answers can be pickled and copied.
+        problem: problem of the search.
     """
 
     make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
     problem: Problem = dataclasses.field(kw_only=True, repr=False, compare=False)
 
     def motions(self) -> Any:
-        """Motions of the answers, with the number of arcs found, else with that of the best candidate.
+        """Motions of the answers, with the number of arcs found, or, if none is, that of the best candidate.
 
         Returns:
-            one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
+            one motion whose leaves have a leading dimension (n,), in the robot's axes, for `jax.vmap`.
         """
         return self.make(self)
 
     def causes(self: Any) -> list[tuple[Cause, ...]]:
-        """Find the causes why motions are not feasible, with needed and allowed values.
+        """Find why motions are not feasible, with needed and allowed values.
 
         Returns:
             the causes for each of the n motions, the worst one first; a feasible motion has none.
         """
-        from cspr_jax.verification.attained import with_attained  # searches themselves need no proof of any motion
+        from cspr_jax.verification.attained import with_attained  # searches themselves need no general proof
 
         with double_precision():
             placed, count = self.make(self), len(self.verdict)
@@ -96,15 +96,15 @@ def minimum_arcs(
     """Smallest number of arcs to each of many targets, with duration, margin and verdict.
 
     Args:
-        robot: a point mass on three cables or more; on more than three the margin is how far all tensions can keep from
-            their limits, over weight / n_cables.
+        robot: point mass on three cables or more; on more than three, the margin is the distance that all tensions can
+            keep from their limits, over weight / n_cables.
         targets: (n, 3) targets in the robot's axes, m.
-        start: (3,) or (n, 3) start points in the robot's axes, m; None: at rest in P0. A start is also at rest in P0 if
-            its distance from P0 is within 1e-9 of the robot's size (the largest distance of a spool from their
-            centroid); for another start near P0 its direction from P0 decides the motion.
+        start: (3,) or (n, 3) start points in the robot's axes, m; None: at rest in P0. A start also counts as at rest
+            in P0 if its distance from P0 is within 1e-9 of the robot's radius (the largest distance of a spool from
+            the centroid of the spools). For any other start near P0 the motion depends on its direction from P0.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
-        amplitude: name of an amplitude function, or the function; None: the quintic (2.50).
-        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        amplitude: name of an amplitude function, or the function itself; None: the quintic (2.50).
+        limits: replace those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
         max_arcs: largest number of arcs tried.
 
     Returns:
@@ -154,19 +154,19 @@ def minimum_oscillations(
     """Smallest number of oscillations of a transition from rest to each of many targets, thesis chapter 1.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane; or on more, as in `minimum_arcs`.
+        robot: point mass on three cables, or on two in a plane; or on more, as in `minimum_arcs`.
         targets: (n, 3) targets in the robot's axes, m.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
-        amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
+        amplitude: name of an amplitude function, or the function itself; it must satisfy (1.27) and (1.28).
         limits: as in `minimum_arcs`.
         max_arcs: twice the largest number of oscillations tried.
 
     Returns:
-        the answers, (n,) each, with numbers of oscillations by the envelopes and by the tensions themselves; on more
-        cables there are no envelopes.
+        the answers, (n,) each, with numbers of oscillations by the envelopes and by the tensions themselves; redundant
+        cables have no envelopes.
 
     Raises:
-        InputError: as `minimum_arcs` does.
+        InputError: as for `minimum_arcs`.
     """
     check_point_mass(robot)
     ends = points_of("targets", targets)

@@ -1,4 +1,4 @@
-"""Launches from swings to many landing points, from Python."""
+"""Launches from swings to many landing points from Python."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ def swing_range(
     release_z: ReleaseRange = None,
     limits: Limits | None = None,
 ) -> SwingRange:
-    """Launches of least speed to landing points, from ellipses about positions of rest, at their natural frequencies.
+    """Launches of least speed to landing points, from ellipses about positions of rest at their natural frequencies.
 
     Args:
-        robot: a point mass on spools in one plane, on any number of cables.
+        robot: point mass on any number of cables, with all spools in one plane.
         targets: (n, 3) landing points in the robot's axes, m.
-        start: (3,) or (n, 3) centres of the ellipses, where the robot rests before, in the robot's axes, m.
-        release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
-            the spools.
-        release_y: least and largest y of the release, m; None: as for x.
-        release_z: least and largest z of the release, m; None: from the centroid down to four times the robot's size
+        start: (3,) or (n, 3) centres of the ellipses, where the robot rests at first, in the robot's axes, m.
+        release_x: smallest and largest x of the release, m; None: twice the robot's radius to each side of the centroid
+            of the spools.
+        release_y: smallest and largest y of the release, m; None: as for x.
+        release_z: smallest and largest z of the release, m; None: from the centroid to four times the robot's radius
             below it.
         limits: a floor, z in the robot's axes, and no other limit; None: those of the robot.
 
     Returns:
-        the launches, in the robot's axes. A formula proves that they are feasible. That no slower launch is feasible
-        is not proved: times of flight are searched.
+        the launches, in the robot's axes. A formula proves that they are feasible. It is not proved that no slower
+        launch is feasible: times of flight are searched.
 
     Raises:
         InputError: the wrong kind of robot, spools in several planes, pulleys, limits other than a floor, shapes that

@@ -1,4 +1,4 @@
-"""Robots of other programs from Python: read, and written as robot files."""
+"""Robots of other programs from Python: reading them, and writing them as robot files."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class ImportedRobot:
     """Robot that was read from a file of another program.
 
     Fields:
-        robot: the robot, as all functions take it.
+        robot: the robot, in the form for all functions.
         keys: keys of its robot file, as plain values.
-        warnings: items that were left out, and probable mistakes, one line each.
+        warnings: items that were omitted, and probable mistakes, one line each.
     """
 
     robot: PointMassRobot | PlatformRobot
@@ -72,14 +72,15 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
     """Read a robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
 
     Args:
-        path: the file, for CASPR either of the two; at most 1 MB.
+        path: the file, for CASPR either of the two, at most 1 MB.
         cable_set: name of a set of cables of CASPR; None: the file's default.
 
     Returns:
         the robot, z up.
 
     Raises:
-        ConfigError: there is no such file or set, it has a mistake, or no robot file can express it (several links).
+        ConfigError: there is no such file or set, a file has a mistake, or no robot file can express it (several
+            links).
     """
     file = Path(path)
     if format_of(file.name) is None:

@@ -11,13 +11,13 @@ from cspr_jax.errors.arguments import Names, RobotNames
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs import example_files, listings
 
-# There is a template for each of these kinds of file.
+# Kinds of file for which there is a template.
 KINDS = ("robot", "sweep", "plan")
 
 
 @checked()
 def list_robots(names: RobotNames = ()) -> list[dict[str, Any]]:
-    """The robots of the catalogue, or the robots that are named.
+    """The robots of the catalogue, or the named robots.
 
     Args:
         names: a catalogue name or the path of a robot file, or several; empty: the whole catalogue.
@@ -54,7 +54,7 @@ def list_examples() -> dict[str, str]:
 
 @checked()
 def copy_examples(names: Names, folder: str | Path = ".") -> list[Path]:
-    """Copy example files, to be changed; nothing is overwritten.
+    """Copy example files as a start for changes; nothing is overwritten.
 
     Args:
         names: a name of `list_examples`, or several.
@@ -85,7 +85,7 @@ def new_file(
     Args:
         what: "robot", "sweep" or "plan".
         path: file to write, .toml; nothing is overwritten.
-        like: for a robot: catalogue robot whose values it takes.
+        like: for a robot: catalogue robot whose values are taken.
         map: for a sweep: kind of map.
         family: for a plan: trajectory family.
 
@@ -97,7 +97,7 @@ def new_file(
         RefusedError: a file of that name exists.
         StoreError: the file cannot be written.
     """
-    from cspr_jax.outputs import templates  # with the schema of files, which lists do not need
+    from cspr_jax.outputs import templates  # loads the schema of files, which lists do not need
 
     if what not in KINDS:
         raise ConfigError("what", f'"{what}": {demand(one_of(what, KINDS))}')

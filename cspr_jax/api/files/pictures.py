@@ -48,27 +48,29 @@ def plot(  # noqa: PLR0913
     """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
 
     Args:
-        results: a result of `open_result`, or the path of a result, a run directory or a motion file; or several.
-        quantity: map: a quantity; None: "arcs", or the first there is. Motion: "trajectory", the path in space;
+        results: a result of `open_result`, or the path of a result, a run directory or a motion file; or several of
+            them.
+        quantity: map: a quantity; None: "arcs", or the first available one. Motion: "trajectory", the path in space;
             "tensions", with their limits; "summary", all on one page; "acceleration", with the feasible ones at the
             time `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight lines; or
             "landing", of a sample of throws; None: path and tensions over time.
-        at: map: fixed values of axes, within their ranges; the nearest point is taken. Motion: "t", s.
-        best: map: axes of which each cell shows the best point, such as "z0"; see `Result.best`. Quantity "best_z0"
-            is that point.
-        lines: axis whose points become lines; None: sections, or one line.
+        at: map: fixed values of axes, within their ranges; the nearest point is taken. Motion: the time "t", s.
+        best: map: axes for which each cell shows the best point, such as "z0"; see `Result.best`. The quantity
+            "best_z0" is that point.
+        lines: axis whose points become lines; None: sections, or a single line.
         envelope: whether to draw all orientations at one position, in three dimensions.
         solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
-        ratio: whether to draw the quantity of the first of two maps over that of the second, over the same cells.
+        ratio: whether to draw the ratio of the quantity of the first of two maps to that of the second, on equal cells.
         size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
         dpi: pixels per inch of a file; None: 160.
         font_size: size of the font, points; None: 10.
-        preset: "column", 8.89 cm wide, or "page", 17.5 cm, of a paper, or "column elsevier", "page ieee", "column
-            8.5cm" and the like; the height follows. None: neither.
-        title: whether titles are drawn; a motion that is not proved feasible is marked in any case.
-        plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
-        robot: in place of `plan`, the robot of motions in CSV, as for `check`; None: none.
-        z_axis: in place of both, the direction of z in them, "up" or "down"; None: as robot and plan say, else guessed.
+        preset: "column", 8.89 cm wide, or "page", 17.5 cm wide, for papers, or "column elsevier", "page ieee", "column
+            8.5cm" and the like; the height is adapted. None: no preset.
+        title: whether to draw titles; a motion that is not proved feasible is marked in any case.
+        plan: plan file of motions in CSV files, which store neither robot nor limits; None: no plan.
+        robot: instead of `plan`, the robot of motions in CSV files, as for `check`; None: no robot.
+        z_axis: instead of both, the direction of z in such files, "up" or "down"; None: as in robot or plan, else
+            guessed.
         output: picture to write; its ending selects the format. None: nothing is written.
 
     Returns:
@@ -76,7 +78,7 @@ def plot(  # noqa: PLR0913
 
     Raises:
         StoreError: a file cannot be read, or the picture cannot be written.
-        ConfigError: an unknown quantity or axis, nothing to draw, a size out of bounds, or an unknown picture format.
+        ConfigError: an unknown quantity or axis, nothing to draw, a size out of range, or an unknown picture format.
     """
     sources = [results] if isinstance(results, str | Path | Result) else list(results)
     if not sources:
@@ -100,7 +102,7 @@ def plot(  # noqa: PLR0913
 
 
 def sources_beside(plan: str | Path | None, robot: AnyRobot | str | Path | None, z_axis: str | None) -> dict[str, Any]:
-    """Robot, plan or axes beside motions in CSV."""
+    """Robot, plan or axes that belong to motions in CSV files."""
     sources = {"--plan": plan, "--robot": robot, "--z-axis": z_axis}
     options = [option for option, value in sources.items() if value is not None]
     if len(options) > 1:
@@ -116,13 +118,13 @@ def sources_beside(plan: str | Path | None, robot: AnyRobot | str | Path | None,
 def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:
     if isinstance(source, Result) or beside["robot"] is None or not is_own_motion(source):
         return completed(source if isinstance(source, Result) else open_result(source), name, **beside)
-    from cspr_jax.api.checks import check_file  # only motions of users need it
+    from cspr_jax.api.checks import check_file  # only users' own motions need it
 
     return check_file(source, beside["robot"], outputs=["-o"]).plan.to_result()
 
 
 def names_of(axes: str | Iterable[str]) -> list[str]:
-    """Names of axes that may be given as one."""
+    """Names of axes as a list; a single name may be given as text."""
     return [axes] if isinstance(axes, str) else list(axes)
 
 

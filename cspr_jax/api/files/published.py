@@ -1,4 +1,4 @@
-"""Published tables from Python, computed again as by `cspr table`, and raw speed, measured as by `cspr bench`."""
+"""Published tables from Python, recomputed as by `cspr table`, and speed, measured as by `cspr bench`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
 if TYPE_CHECKING:
     from cspr_jax.outputs.table_layout import Cell
 
-# Tables and rates rest on much that the other does not need: each is imported where it is used.
+# Tables and rates need different large parts of the package: import each where it is used.
 
 
 def list_tables() -> dict[str, str]:
-    """The published tables that can be computed again.
+    """The published tables that can be recomputed.
 
     Returns:
-        title of each table, with its source, by name.
+        the title of each table, with its source, by name.
     """
     from cspr_jax.published.tables import TABLES
 
@@ -41,7 +41,7 @@ def table(
     workers: AnyInteger | None = 1,
     again: bool = True,
 ) -> list[Cell]:
-    """Compute a published table again.
+    """Recompute a published table.
 
     Args:
         name: a name of `list_tables`.
@@ -53,14 +53,14 @@ def table(
         values: tables 3.3, 3.4: number of values of beta-hat tried at each orientation; None: 20.
         workers: tables 3.3, 3.4: number of processes on this machine; above 1, a script must call this function under
             `if __name__ == "__main__":`. None: the usual number.
-        again: whether it is computed even where an earlier run of the same version has kept its cells beside the
-            compiled code, as `cspr table` does (`keep_compiled_code`).
+        again: whether to compute even if an earlier run of the same version has stored the cells beside compiled code,
+            as `cspr table` does (`keep_compiled_code`).
 
     Returns:
         the cells of the table, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
 
     Raises:
-        ConfigError: there is no such table, or it has no such choice.
+        ConfigError: there is no such table, or it has no such option.
         ResourceError: a worker process died.
     """
     from cspr_jax.published.tables import TABLES, chosen, table_cells
@@ -82,13 +82,13 @@ def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
     """Measure feasibility checks per second, beside a NumPy version of the same check; this takes a minute.
 
     Args:
-        kernels: folder of C++ kernels to measure too, such as `benchmarks` of a checkout; None: no kernels.
+        kernels: folder of C++ kernels to measure as well, such as `benchmarks` of a checkout; None: no kernels.
 
     Returns:
         what `cspr bench --json` prints.
 
     Raises:
-        ConfigError: there is no compiler, it refuses a kernel, or the kernel gives other numbers.
+        ConfigError: there is no compiler, it rejects a kernel, or a kernel gives other numbers.
     """
     from cspr_jax.bench import bench
 

@@ -1,4 +1,4 @@
-"""Plans played in MuJoCo from Python, as `cspr replay` plays them."""
+"""Replays of plans in MuJoCo from Python, as by `cspr replay`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PlanOrFile = Annotated[
 @with_suggestions
 @dataclasses.dataclass(frozen=True)
 class Replay(replays.PlayedPlan):
-    """A plan, and its motion as MuJoCo plays it; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
+    """A plan, and its motion as played by MuJoCo; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
 
     @checked()
     def plot(
@@ -59,7 +59,7 @@ class Replay(replays.PlayedPlan):
             the figure of matplotlib.
 
         Raises:
-            ConfigError: a size out of bounds, or an unknown picture format.
+            ConfigError: a size out of range, or an unknown picture format.
             StoreError: the picture cannot be written.
         """
         return finished(
@@ -69,19 +69,19 @@ class Replay(replays.PlayedPlan):
 
 @checked()
 def replay(given: PlanOrFile, *, step: float = STEP, anyway: bool = False) -> Replay:
-    """Play a plan in MuJoCo: the path that its tensions give, and the tensions that MuJoCo needs along its path.
+    """Play a plan in MuJoCo: the path that results from its tensions, and the tensions that its path needs.
 
     Args:
-        given: a plan, its file, or a dictionary, as for `plan`.
-        step: the longest step of MuJoCo's integrator, RK4, s.
-        anyway: whether to play a plan that is not feasible, too; cables in MuJoCo never push.
+        given: a plan, a plan file, or a dictionary, as for `plan`.
+        step: longest step of MuJoCo's integrator, RK4, s.
+        anyway: whether to play a plan even if it is not feasible; cables in MuJoCo never push.
 
     Returns:
         played and planned path and tensions, at the ends of the steps.
 
     Raises:
-        ConfigError: MuJoCo is not installed, the plan has a mistake, is not feasible or has no finite motion, or the
-            step is no number > 0 or gives too many rows.
+        ConfigError: MuJoCo is not installed; the plan has a mistake, is not feasible or has no finite motion; or the
+            step is not positive or gives too many rows.
     """
     need_mujoco()
     planned = given if isinstance(given, Plan) else plan(given)

@@ -1,4 +1,4 @@
-"""Pages to explore results and plans in a browser, as `cspr report` writes them."""
+"""Pages to explore results and plans in a browser, from Python, as by `cspr report`."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from cspr_jax.store.reading.result import Result, open_result
 ResultOrPlan = Annotated[
     str | Path | Result | Plan, Kind("a result, a plan, or the path of one", (str, os.PathLike), ("to_xarray",))
 ]
-USUAL, MAX_TRAJECTORIES = 50, 500  # motions of cells, by default and at most
-RATE = 60.0  # rows per second of a plan's motion
-STEP = 100  # to a multiple of which the number of its rows is rounded
+USUAL, MAX_TRAJECTORIES = 50, 500  # number of motions of cells, by default and at most
+RATE = 60.0  # rows per second for the motion of a plan
+STEP = 100  # the number of rows is rounded up to a multiple of this
 
 
 @checked()
@@ -55,7 +55,7 @@ def report(
     robot: RobotOrFileOrNone = None,
     z_axis: Literal["down", "up"] | None = None,
 ) -> list[str]:
-    """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
+    """Write a page to explore a map or a plan in a browser: one file that needs no network.
 
     For a map the page shows sections with sliders over the other axes, the values of each cell, and the motions of
     chosen cells; for a plan its motion.
@@ -64,14 +64,15 @@ def report(
         given: path of a result of `cspr run`, of its run directory, of a motion of `cspr plan -o` or of a plan file; or
             a loaded result or plan.
         output: page to write, .html.
-        trajectories: map: number of cells whose motions are included besides `cells`, the most informative ones.
-        cells: map: further cells whose motions are included: coordinates by axis, of which the nearest point is taken;
-            missing axes are at their first point.
+        trajectories: map: number of cells whose motions are included in addition to `cells`: the most informative ones.
+        cells: map: further cells whose motions are included, by coordinates for each axis; the nearest point is taken.
+            Axes without a coordinate are at their first point.
         quantity: map: quantity to show first; None: the main quantity of its kind of map.
-        best: map: axes of which each cell shows the best point, such as "z0", as in `plot`.
-        plan: plan file of a motion in CSV, which keeps neither robot nor limits; None: none.
-        robot: in place of `plan`, the robot of a motion in CSV, as for `check`; None: none.
-        z_axis: in place of both, the direction of z in it, "up" or "down"; None: as robot and plan say, else guessed.
+        best: map: axes for which each cell shows the best point, such as "z0", as in `plot`.
+        plan: plan file of a motion in a CSV file, which stores neither robot nor limits; None: no plan.
+        robot: instead of `plan`, the robot of a motion in a CSV file, as for `check`; None: no robot.
+        z_axis: instead of both, the direction of z in the file, "up" or "down"; None: as in robot or plan, else
+            guessed.
 
     Returns:
         warnings, one line each.
@@ -111,7 +112,7 @@ def report(
 
 
 def _is_own(source: str | Path | Result | Plan, spec: dict[str, Any] | None) -> bool:
-    # A motion of the user's own, and its robot.
+    # Tell whether the page is for a user's own motion, with its robot.
     if spec is None or isinstance(source, Result | Plan) or Path(source).suffix == ".toml":
         return False
     return is_own_motion(Path(source))
@@ -153,7 +154,7 @@ def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], l
 def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
-        # Motions of about one length have as many rows, so that they share compiled code.
+        # Give motions of similar length the same number of rows, so that they share compiled code.
         rate = STEP * np.ceil(min(RATE * length, MAX_ROWS) / STEP) / length
         columns = motion_files.rows(planned, rate=float(rate))
         columns |= planned.outcome_columns | motion_files.failures(planned) | path_columns(planned)
@@ -180,7 +181,7 @@ def _of_map(
             warnings.append(f"{_words(result, index)}: no motion, its numbers are not finite")
             continue
         coordinates = dict(zip(result.axes, index, strict=True))
-        # If a point occurs twice, the page shows the first.
+        # If an axis has the same point twice, the page shows the first.
         same = [_rank(result.axes[name], chosen, coordinates[name]) for name, chosen in zip(names, points, strict=True)]
         motion_of_cell[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
         motions.append(planned)
