@@ -33,7 +33,7 @@ SHORTEST = 0.003  # shortest time of flight over the longest one
 GRID = 513  # number of times of flight tried first
 AROUND = 33  # number of times in each narrower grid about the best one
 NARROWED = 8  # number of narrower grids
-# Ellipses keep this fraction of the depth of their centre to the plane of the spools.
+# Distance of ellipses from the plane of the spools, over the depth of their centre.
 KEPT = 1e-6
 # Bound of the rounding errors of margins.
 MARGIN_ERROR = 1e-13

@@ -158,7 +158,7 @@ def _proved(
 
 
 def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
-    # Search again for one motion, with planes that separate its bodies, which differ from motion to motion; return None
+    # Search again for one motion, with planes that separate its bodies; each motion has its own planes. Return None
     # without a proof.
     proof = proved(question, tasks, unknowns)
     if proof.is_stopped:

@@ -23,8 +23,8 @@ from cspr_jax.numerics.shapes import Float
 # Number of samples of a piece of the S-model; a half of another law has twice as many.
 SAMPLES = 33
 HALF = 2 * SAMPLES
-# Ratios tried first, as logits; each later round tries points at these fractions of the spacing about the best one.
-# `ROUNDS` is the number of rounds.
+# Ratios tried first, as logits. Each later round tries points at the fractions `FINER` of the spacing about the best
+# one.
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # A duration from the search is prolonged by these fractions, in order, until it is proved.

@@ -70,7 +70,7 @@ class Basis(NamedTuple):
 
 @lru_cache(maxsize=8)
 def basis(intervals: int, samples: int) -> Basis:
-    """Basis functions."""
+    """Basis functions on a number of intervals, with a number of samples in each."""
     borders = np.linspace(0.0, 1.0, intervals + 1)
     knots = np.concatenate([np.zeros(DEGREE), borders, np.ones(DEGREE)])
     count = intervals + DEGREE

@@ -1,9 +1,9 @@
 """Least time along paths on a grid: sets of path speeds from which the end can be reached, and fastest motions.
 
 From the last cell to the first, K = {x : some u in the half-planes of the cell leads into the next K} is an interval
-(Pham and Pham 2018) where h(x) = beta(x) - alpha(x) >= 0. Here beta, the smallest upper bound of u, less alpha, the
-largest lower one, is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function,
-and end after a few; a derivative that points away from zero proves that K is empty. So no linear program is needed.
+(Pham and Pham 2018) where h(x) = beta(x) - alpha(x) >= 0. With beta the smallest upper bound of u, and alpha the largest
+lower one, h is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function, and end
+after a few; a derivative that points away from zero proves that K is empty. So no linear program is needed.
 
 Within a cell u changes at a constant rate, chosen in advance; half-planes hold at both ends of each cell.
 Paths are the last axis of all arrays, and are solved together.

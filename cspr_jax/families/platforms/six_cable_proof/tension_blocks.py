@@ -66,8 +66,8 @@ class TensionBounds(NamedTuple):
     Fields:
         nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up so that they are not below the true
             ones; infinite where D is not certainly positive. With margins the slack of the determinant is that of
-            `wrench_lanes.normalised_determinant` over its value at rest in P0. Reduced to their minima: (1, n_criteria,
-            n).
+            `wrench_lanes.normalised_determinant` over its value at rest in P0. Without all nodes: only the minima,
+            (1, n_criteria, n).
         offset: (n,) time in the block of the smallest of the minima, from -1 to 1; 0 if all nodes are kept.
         bound: (n_criteria, n) proved lower bounds.
         rounding: (n,) largest allowance for rounding in the slacks of taut cables, before division by D.

@@ -1,4 +1,4 @@
-"""Transitions between rest and a point beyond the static workspace, thesis chapter 1, in the product's axes.
+"""Transitions between rest and a point beyond the static workspace, thesis chapter 1, in the axes of the kernels.
 
 The effector oscillates about p0 on the straight line through the target, in n oscillations that grow
 with the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the duration
