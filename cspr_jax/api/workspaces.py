@@ -68,7 +68,7 @@ def workspace(  # noqa: PLR0913
     Args:
         robot: point mass or body on at least as many cables as degrees of freedom; pulleys are taken into account.
         positions: (n, 3) positions of `point`, or of the joint, in the robot's axes, m; n >= 1.
-        orientations: (n, 4) unit quaternions, scalar first, relative to the robot file's orientation; None: no rotation.
+        orientations: (n, 4) unit quaternions, scalar first, relative to the robot file; None: no rotation.
         condition: "static": taut cables with any tensions hold the weight; "wrench-feasible": tensions within limits
             supply all given wrenches; "wrench-closure": with large enough tensions cables resist every wrench.
         tension_min: for "wrench-feasible": smallest tension, () or (n_cables,) N; None: the robot's, else 0.

@@ -1,7 +1,7 @@
 """Least time along paths on a grid: sets of path speeds from which the end can be reached, and fastest motions.
 
 From the last cell to the first, K = {x : some u in the half-planes of the cell leads into the next K} is an interval
-(Pham and Pham 2018) where h(x) = beta(x) - alpha(x) >= 0. With beta the smallest upper bound of u, and alpha the largest
+(Pham and Pham 2018) where h(x) = beta(x) - alpha(x) >= 0. With beta the smallest upper bound of u and alpha the largest
 lower one, h is concave and piecewise linear. Newton's steps from outside never pass a zero of such a function, and end
 after a few; a derivative that points away from zero proves that K is empty. So no linear program is needed.
 
