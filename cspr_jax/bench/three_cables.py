@@ -34,7 +34,7 @@ class ThreeCableWork(NamedTuple):
     Fields:
         problem: robot and amplitude function.
         ends: (n, 3) end points, m.
-        segments: for even numbers of arcs and for odd ones, arrays (n, ...).
+        segments: segments for even and for odd numbers of arcs, arrays (n, ...).
     """
 
     problem: Problem

@@ -28,7 +28,7 @@ class PlanLegs:
     """Poses of a plan.
 
     Args:
-        path: of the plan file, named in errors.
+        path: path of the plan file, named in errors.
 
     Fields:
         waypoints: all poses.

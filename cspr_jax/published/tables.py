@@ -177,7 +177,7 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
     """Result of an earlier run with the same sources, libraries and settings; if there is none, compute and keep it.
 
-    It is kept beside compiled code, under a checksum: damaged results are removed before they are read.
+    Results are kept beside compiled code, under a checksum: damaged ones are removed before they are read.
     """
     folder = os.environ.get(PROGRAMS)
     if not folder:

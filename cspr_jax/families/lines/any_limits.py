@@ -20,7 +20,7 @@ from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensi
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.shapes import Float
 
-# Number of samples of a piece of the S-model; a half of another law has twice as many.
+# Number of samples of a piece of the S-model; each half of another law has twice as many.
 SAMPLES = 33
 HALF = 2 * SAMPLES
 # Ratios tried first, as logits. Each later round tries points at the fractions `FINER` of the spacing about the best

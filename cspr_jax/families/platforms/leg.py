@@ -39,7 +39,7 @@ from cspr_jax.verification.fewest_limits import Refused
 
 # The third derivative of the amplitude function counts as jumping at a knot if it changes by this relative amount.
 JUMP = 1e-6
-NEAR_KNOT = 1e-12  # it is compared at this distance from a knot
+NEAR_KNOT = 1e-12  # distance from a knot at which both sides are compared
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
 # Cost, in arcs, of a motion that only limits refuse: more than any sequence of feasible motions costs.
 REFUSED = 100_000

@@ -33,7 +33,7 @@ def conservative_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float
     """
     below, depth, normal = _depths(robot, targets)
     height, square = below[:, 2], (below**2).sum(1)
-    sine_squared = 1.0 - 1.0 / (normal @ normal)  # of the plane's inclination
+    sine_squared = 1.0 - 1.0 / (normal @ normal)  # squared sine of the plane's inclination
     inside = height**2 - sine_squared * square
     if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
         return float("nan")

@@ -122,7 +122,7 @@ def repaired_values(
 ) -> Float[np.ndarray, "l s m n n_values"]:
     """Changes dv of the values that correct residuals e of the equations while the state stays the same.
 
-    They minimise dv^T W dv + (e + A dv)^T (e + A dv) / S.
+    These minimise dv^T W dv + (e + A dv)^T (e + A dv) / S.
     """
     dof, cables = matrix.shape[-2:]
     softness = soft.softness[:, None, None, None, None]

@@ -24,7 +24,7 @@ class Step(NamedTuple):
     """Step of l motions.
 
     Fields:
-        change: of the unknowns.
+        change: change of the unknowns.
         merit_derivative: (l,) derivative of the merit along the step.
         regularization: (l,) number added to the diagonal.
         missed: (l, s, m, n, n_equations) change of the residuals of equations, to first order.

@@ -73,7 +73,7 @@ class NodeHalfPlanes(NamedTuple):
         return NodeHalfPlanes(u, x, maximum, self.cap, self.width)
 
     def beside(self, others: "NodeHalfPlanes") -> "NodeHalfPlanes":
-        """These half-planes and others."""
+        """These half-planes, and others beside them."""
         u, x, maximum = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
         return NodeHalfPlanes(u, x, maximum, self.cap, self.width)
 

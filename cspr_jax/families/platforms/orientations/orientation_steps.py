@@ -114,7 +114,7 @@ class OrientationSteps:
         self._radius = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
         self._side = np.zeros(
             robot.n_cables
-        )  # of each cable in the reference orientation; 0 until it is computed below
+        )  # side of each cable in the reference orientation; 0 until it is computed below
         self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
     def at(self, quaternions: Float[np.ndarray, "n 4"]) -> OrientationSamples:

@@ -116,7 +116,7 @@ def _rough_and_certain(
 ) -> tuple[Array, Array]:
     # Compute `smallest_tensions` in float32, then the smallest tension again in float64, (n,) each.
     lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
-    when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such sample
+    when = jnp.minimum(when, len(tau) - 1)  # there is no smallest sample if all tensions are NaN
     if kind.from_rest:
         return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
     phase = phase_lanes(amplitude, segments.sense, arcs, tau[when])

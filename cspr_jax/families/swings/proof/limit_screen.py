@@ -1,6 +1,6 @@
 """Second screen, for limits: a few samples refute most numbers of arcs that clearly break a limit.
 
-It screens candidates only when the search comes to them, as many at a time as a batch holds. A sample that breaks a
+The screen takes candidates when the search comes to them, as many at a time as a batch holds. A sample that breaks a
 limit by more than rounding refutes a candidate; the screen accepts none.
 """
 
