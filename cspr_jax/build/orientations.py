@@ -20,7 +20,7 @@ def orientations(
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> Float[np.ndarray, "4"]:
-    """An orientation given as a quaternion, which may miss length 1 by rounding."""
+    """Orientation given as a quaternion, whose norm may differ from 1 by rounding."""
     unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
     norm = float(np.linalg.norm(unit_quaternion))
     if abs(norm - 1.0) > UNIT_NORM:
@@ -29,7 +29,7 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
 
 
 def pose_quaternions(waypoints: Waypoints, points: Float[np.ndarray, "n_poses 3"]) -> Float[np.ndarray, "n_poses 4"]:
-    """Orientations of way-points, by their quaternions or by tilt and torsion, in the kernels' axes."""
+    """Orientations of waypoints, given as quaternions or as tilt and torsion, in the kernels' axes."""
     frame, poses = waypoints.frame, waypoints.poses
     units = [
         given_quaternion(pose.quaternion, f"{waypoints.name(i)}.quaternion", waypoints.path)

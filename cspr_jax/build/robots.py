@@ -19,7 +19,7 @@ from cspr_jax.robots.static_equilibrium import slack_at_rest
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.robots.statics.reference_pose import reference_pose
 
-# Names of the catalogue, by which type checkers tell what `load_robot` returns.
+# Names of the catalogue, from which type checkers infer whether `load_robot` returns a point mass or a platform.
 PointMassName = Literal[
     "boralugoda-planar-three",
     "boralugoda-planar-two",
@@ -49,7 +49,7 @@ PlatformName = Literal[
 
 
 def build_limits(robot_file: RobotFile, spec: LimitKeys, file: object) -> Limits:
-    """Limits of the file, with those of the robot where it gives none."""
+    """Limits of a plan or sweep; where it gives none, those of the robot."""
     pairs = robot_file.pairs
     try:
         limits = limits_of(robot_file, vars(spec), vars(robot_file), "", len(robot_file.as_written.base_points))
@@ -111,7 +111,7 @@ def kernel_robot(
     robot: Any = build_robot(robot_file, spec, file)
     source, key = robot_file.placed("base_points", file)
     try:
-        # Families that move robots on any number of cables move the patterns that their rows name.
+        # With any number of cables, the rows of families name the patterns of motion that they serve.
         if robot.pattern in MOVED or not any_cables:
             check_moved(robot, pulleys=pulleys)
         if not is_redundant_platform(robot):
@@ -147,5 +147,5 @@ def error_at_rest(robot_file: RobotFile) -> str | None:
 
 
 def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
-    """Tell whether margins of tensions decide about a robot, for which largest tensions may be infinite."""
+    """Tell whether a platform has redundant cables: its verdicts rest on margins, so tension_max may be infinite."""
     return isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof

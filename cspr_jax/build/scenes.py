@@ -75,7 +75,7 @@ def scene_of(
     *,
     trajectory: TrajectoryKeys,
 ) -> Scene:
-    """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`."""
+    """Scene of the robot of a problem, in which platforms have their reference axes; see `build_scene`."""
     written = centred(build_robot(robot_file, trajectory, file))[0]
     rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
     return build_scene(robot, robot_file, frame, spec, file, rotation=rotation)

@@ -1,4 +1,4 @@
-"""The catalogue of robots: its folder and its robots; listing it needs no check of files."""
+"""The catalogue of robots: its folder and the names of its robots, listed without checking their files."""
 
 import tomllib
 from pathlib import Path
@@ -16,5 +16,5 @@ def catalogue_names() -> list[str]:
 
 
 def catalogue_specs() -> list[dict[str, Any]]:
-    """Keys of the robots that come with the package, as their files have them."""
+    """Parsed files of the robots that come with the package."""
     return [tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) for name in catalogue_names()]

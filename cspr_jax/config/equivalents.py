@@ -1,4 +1,4 @@
-"""Choice of the robot that a plan or a sweep moves: that of its file, or an equivalent point mass on three cables."""
+"""Choice of the robot that a plan or sweep moves: the robot of its file, or a point mass equivalent to it."""
 
 from collections.abc import Collection, Iterable
 
@@ -9,7 +9,7 @@ PLATFORM = "3R3T"
 
 
 def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
-    """The robot as trajectory families, or a kind of map, move it."""
+    """The robot itself, or its equivalent point mass where trajectory families, or a map, need a point mass."""
     if not robot_file.is_platform:
         return robot_file
     if not robot_file.translation_only and all(PLATFORM in allowed for allowed in patterns):
@@ -21,7 +21,7 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
 
 
 def no_equivalent(robot_file: RobotFile) -> str:
-    """Reason why a platform is not moved as a point mass, to be appended to a line that refuses it."""
+    """Reason why a platform has no equivalent point mass, to be appended to a message that refuses it."""
     try:
         if robot_file.is_platform:
             robot_file.parallel_pairs()

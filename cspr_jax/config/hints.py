@@ -15,9 +15,9 @@ from cspr_jax.robots.model.spool_plane import in_plane
 # Cameras over stadiums hang from spools up to 250 m apart; a larger robot, such as the cabin of a radio telescope,
 # weighs tonnes.
 LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
-# A body's radius of gyration is near its size. Grams for kilograms or millimetres for metres miss by 1e3 at least.
+# Bounds of inertia over mass times squared size, which is near 1; a wrong unit changes it by a factor of 1e3 at least.
 INERTIA_RATIOS = (1e-5, 1e3)
-# Part of the distances between the points of a platform; tables of points are rounded.
+# Rounding errors of tables of points, as a fraction of the distances between the points of a platform.
 ROUNDED_BY_HAND = 1e-3
 
 
@@ -43,7 +43,7 @@ def robot_hints(robot_file: RobotFile) -> list[str]:
 
 
 def _unbalanced(robot_file: RobotFile) -> list[str]:
-    # A mass centre far from the points is mostly one from another origin, or what another program writes by default.
+    # A mass centre far from the points usually has another origin, or is the default of another program.
     if robot_file.platform_points is None:
         return []
     centre, axes = (
@@ -64,7 +64,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
 
 
 def _distance_to_hull(points: np.ndarray) -> float:
-    # Return how far the origin is from the hull of points (n, axes), of size 1. One heavy row holds the sum of weights.
+    # Distance of the origin from the hull of points (n, axes) of extent 1; a heavy row keeps the sum of weights at 1.
     if np.linalg.norm(points.mean(axis=0)) <= ROUNDED_BY_HAND:
         return 0.0
     from scipy.optimize import nnls  # takes long to import, and the mean mostly suffices
@@ -73,7 +73,7 @@ def _distance_to_hull(points: np.ndarray) -> float:
     rows = np.vstack([points.T, np.full(len(points), heavy)])
     try:
         weights, _ = nnls(rows, np.append(np.zeros(points.shape[1]), heavy), maxiter=100 * len(points))
-    except RuntimeError:  # it found no end
+    except RuntimeError:  # the solver did not converge
         return 0.0
     return float(np.linalg.norm(weights @ points) / weights.sum())
 
@@ -114,7 +114,7 @@ def sweep_hints(spec: SweepFile, robot_file: RobotFile) -> list[str]:
 
 
 def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:
-    """Tell whether the z axis seems to point the other way."""
+    """Question about the z axis, if it seems to point the other way; else empty."""
     frame = frame_of(robot_file.base_points, robot_file.z_axis)
     depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, robot_file.base_points))
     is_above = bool(len(depths)) and depths.max() < spools.min()

@@ -9,12 +9,12 @@ from cspr_jax.errors import shown
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.robots.model.spool_plane import AT_P0, largest_radius
 
-# Positions nearer to P0 than this, m or of z0, are hardly meant to be other ones.
+# Positions closer to P0 than this, in m or as a fraction of z0, are probably meant to be P0.
 NEAR_P0 = 1e-3
 
 
 def almost_at_rest(key: str, position: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Tell whether a position is P0 except for its last digits."""
+    """Hint that a position was probably meant to be P0; else empty."""
     spools = np.asarray(robot.base_points)
     rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))
     distance = float(np.linalg.norm(np.asarray(position) - rest))

@@ -111,17 +111,17 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
         description="the poses in their order, at least two [[pose]] tables; absent with `motion`, `ellipse` or `path`"
     )
 
-    # Samples and splines by the names of `motion`, in place of files.
+    # Samples and splines that replace files, by the names that `motion` gives them.
     _sources: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     def with_source(self, name: str, source: Any) -> "PlanFile":
-        """The plan, with a motion in place of a file."""
+        """The plan, with a motion that replaces a file."""
         plan = self.model_copy()
         plan._sources = self._sources | {name: source}
         return plan
 
     def source(self, name: str) -> Any:
-        """A motion that stands in place of a file."""
+        """The motion that replaces a file."""
         return self._sources.get(name)
 
     def family_of(self, segment: int) -> str:
@@ -144,7 +144,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
         return tuple(sorted({*launched, *ends, *starts, *turning, *self._ends_of_paths()}))
 
     def _ends_of_paths(self) -> list[int]:
-        # Poses that a path decides: where it ends, and where the first one of a leg begins.
+        # Indices of poses whose positions come from paths: ends of paths, and the start of the first path of a leg.
         ends = []
         for i, path in ((i, pose.path) for i, pose in enumerate(self.pose) if pose.path is not None):
             is_first = i == 1 or (i > 1 and self.family_of(i - 2) != "path")
@@ -165,7 +165,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     @property
     def vectors(self) -> dict[str, list[float] | None]:
-        """Points and velocities of the plan beside its poses, by their keys."""
+        """Points and velocities of the plan other than its poses, by their keys."""
         vectors = {"first_control_point": self.first_control_point}
         if self.launch is not None:
             vectors |= {f"launch.{name}": getattr(self.launch, name) for name in ("point", "target", "velocity")}
@@ -179,7 +179,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
     @model_validator(mode="before")
     @classmethod
     def _of_one_file(cls, data: Any) -> Any:
-        # A plan of one file is a plan of two poses, which the file decides.
+        # A plan of one file becomes a plan of two poses, whose positions come from the file.
         if not isinstance(data, dict):
             return data
         source = {key: data[key] for key in ("motion", "trajectory") if data.get(key) is not None}
@@ -194,13 +194,13 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
     @model_validator(mode="before")
     @classmethod
     def _of_one_ellipse(cls, data: Any) -> Any:
-        # A plan of one ellipse is a plan of two poses, which turns on it.
+        # A plan of one ellipse becomes a plan of two poses on it.
         if not isinstance(data, dict) or data.get("family") != "ellipse":
             return data
         flat = {name: data[name] for name in ELLIPSE_KEYS if name in data}
         if "pose" in data or not (flat or "ellipse" in data):
             return data
-        if "ellipse" in data:  # keys beside the table are unknown ones
+        if "ellipse" in data:  # then the keys of an ellipse outside the table are unknown
             return data | {"pose": [{}, {}]}
         return {name: value for name, value in data.items() if name not in flat} | {"ellipse": flat, "pose": [{}, {}]}
 
@@ -218,7 +218,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
     @model_validator(mode="before")
     @classmethod
     def _of_one_path(cls, data: Any) -> Any:
-        # A plan of one path is a plan of two poses, which the path joins.
+        # A plan of one path becomes a plan of two poses, which the path joins.
         if isinstance(data, dict) and isinstance(data.get("path"), dict) and "pose" not in data:
             return data | {"pose": [{}, {}]}
         return data
@@ -280,7 +280,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     @model_validator(mode="after")
     def _on_ellipses(self) -> "PlanFile":
-        # A launch from an ellipse determines the axes of that ellipse; all others have axes.
+        # A launch from an ellipse determines the axes of that ellipse; all other ellipses must have axes.
         of_launch = -1 if self.launch is None else self.launch.segment + 1
         if of_launch > 0 and self.family_of(of_launch - 1) == "ellipse":
             self._check_launch_ellipse(of_launch)
@@ -314,17 +314,17 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
                 raise table_error(
                     f"limits.{name}", value, f"cannot be combined with {name} = {shown(getattr(self, name))}"
                 )
-        # The rest of the program finds limits in one place.
+        # Move limits from the table [limits] to the plan itself: the rest of the program finds them in one place.
         return self.model_copy(update={"limits": None, **limits})
 
 
 def read_plan(text: str, path: Path) -> PlanFile:
-    """A plan file."""
+    """Read a plan file and check it."""
     return checked_plan(parse_toml(text, path), path)
 
 
 def plan_of_text(text: str, path: Path) -> PlanFile:
-    """Plan that a motion file holds: the text of the plan file, or JSON where there was none."""
+    """Plan that a motion file holds as the text of its plan file, or as JSON where there was no plan file."""
     if len(text) > LARGEST_FILE:
         raise ConfigError(path, f"plan of {len(text)} letters: must be at most {LARGEST_FILE}")
     if not text.startswith("{"):
@@ -337,6 +337,6 @@ def plan_of_text(text: str, path: Path) -> PlanFile:
 
 
 def checked_plan(data: dict[str, Any], file: object) -> PlanFile:
-    """Parsed content of a plan file."""
+    """Check the parsed content of a plan file."""
     refuse_other_kinds(data, "plan", file)
     return checked(PlanFile, data, file)

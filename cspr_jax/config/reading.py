@@ -1,4 +1,4 @@
-"""TOML to a checked model; a mistake becomes one line that names file, key, value and what is allowed."""
+"""Reading of TOML into checked models; each mistake becomes one line with file, key, value and what is allowed."""
 
 import codecs
 import contextlib
@@ -19,19 +19,19 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import look_alike
 
 LARGEST_FILE = 1 << 20
-# The time that tomllib takes grows with the square of a key's parts.
+# Largest number of parts of a dotted key: the time that tomllib takes grows with its square.
 LONGEST_KEY = 64
-LARGEST_LINES = 1000  # errors of one file
+LARGEST_LINES = 1000  # largest number of errors of one file that are listed
 _PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""
 _LOCATION = re.compile(r"\(at line (\d+), column (\d+)\)$")
 _STRING = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
 _BYTE_ORDER_MARKS = (
-    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins like that of UTF-16
+    (codecs.BOM_UTF32_LE, "UTF-32"),  # before UTF-16, whose mark is the beginning of this one
     (codecs.BOM_UTF32_BE, "UTF-32"),
     (codecs.BOM_UTF16_LE, "UTF-16"),
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
-# Which of the first four bytes are zero, where no byte order mark says it.
+# Encodings without a byte order mark, by which of their first four bytes are zero.
 _ZEROS: dict[tuple[bool, ...], str] = {
     (False, True, False, True): "UTF-16",
     (True, False, True, False): "UTF-16",
@@ -40,7 +40,7 @@ _ZEROS: dict[tuple[bool, ...], str] = {
 }
 _LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
 
-# Keys that only one kind has, and where it belongs.
+# Keys that only one kind of file has, and what that kind is.
 _DISTINCTIVE_KEYS = {
     "sweep": ("map", "axes", "trajectory", "run", "orientations"),
     "plan": ("pose",),
@@ -56,21 +56,21 @@ _USES = {
     "plan": "a plan is computed by `cspr plan`",
     "robot": 'a robot file is named in a plan or sweep, robot = "FILE.toml"',
 }
-# Deeper than any of our files is nested; a value that holds itself is deeper still.
+# No file is nested as deeply as this; a value that contains itself is.
 DEEPEST = 32
 
 Model = TypeVar("Model", bound="Table")
 
 
 class Table(BaseModel):
-    """A TOML table: every key known, types as written, numbers finite, nothing changed afterwards."""
+    """A TOML table: unknown keys are refused, types are not converted, numbers finite, and its fields never change."""
 
-    # Checks of a table are built when one is read: a command reads few of them.
+    # The checks of a table are built when it is first read, since a command reads few kinds of tables.
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def other_case(path: Path) -> str:
-    """Clause for a message about a missing file that names one whose name differs in capitals alone."""
+    """Clause of a message about a missing file, which names a file that differs only in upper and lower case."""
     while path.parent != path and not path.parent.is_dir():
         path = path.parent
     try:
@@ -92,7 +92,7 @@ def read_bytes(path: Path) -> bytes:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a file, and only a file, and turn failures to read it into lines."""
+    """Open a regular file, and turn failures to read it into errors of one line."""
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(path, "is not a file")
@@ -127,7 +127,7 @@ def decoded(data: bytes, path: Path, *, line: int = 1) -> str:
 
 
 def look_alike_before(text: str, end: int) -> str:
-    """Clause for the message of a parser that stopped at a character that only looks like one of its own."""
+    """Clause of a parser's message, where it stopped at a character that only looks like one of TOML."""
     start = text.rfind("\n", 0, end) + 1
     return look_alike(_STRING.sub("", text[start : end + 1])[::-1])
 
@@ -146,7 +146,7 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
 
 
 def refuse_long_numbers(text: str, path: Path) -> None:
-    """Refuse whole numbers of more digits than Python reads."""
+    """Refuse integers of more digits than Python reads."""
     longest = sys.get_int_max_str_digits()
     number = re.search(rf"[0-9](?:_?[0-9]){{{longest},}}", text) if longest else None
     if number is not None:
@@ -169,7 +169,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Model:
-    """Data as a model."""
+    """Check data against a model."""
     try:
         return model.model_validate(data)
     except RecursionError as error:
@@ -181,7 +181,7 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
 
 
 def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> None:
-    """Refuse a file of another kind, robot, plan or sweep, rather than every key of it."""
+    """Refuse a file of another kind (robot, plan or sweep) in one line, instead of refusing each of its keys."""
     if any(key in data for key in _DISTINCTIVE_KEYS[expected]):
         return
     for kind, distinctive in _DISTINCTIVE_KEYS.items():
@@ -195,7 +195,7 @@ def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> Non
 
 
 def plain_values(value: Any, depth: int = DEEPEST) -> Any:
-    """A value as parsed TOML would have it, from one that may hold NumPy's numbers and arrays."""
+    """Convert a value that may contain NumPy's numbers and arrays to the types of parsed TOML."""
     if not depth:
         raise InputError(
             "given", None, f"must be nested at most {DEEPEST} deep", problem="nested too deep, or in itself"
@@ -210,5 +210,5 @@ def plain_values(value: Any, depth: int = DEEPEST) -> Any:
 
 
 def json_text(data: dict[str, Any]) -> str:
-    """JSON that is kept in place of a file's text."""
+    """Data as JSON, which is stored where there is no text of a file."""
     return json.dumps(data, default=str)

@@ -32,7 +32,7 @@ SMALLEST_COUNTS = "least numbers of cables are " + ", ".join(
 )
 BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
 POINTS = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if not row.is_body)
-# Two spools count as level if their heights differ by less than this part of their distance; as in
+# Two spools count as level if their heights differ by less than this fraction of their distance; the same as in
 # `robots.model.point_mass`.
 LEVEL = 1e-9
 
@@ -72,7 +72,7 @@ class RobotFile(LimitKeys):
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
     _file: Path | None = PrivateAttr(None)  # file that it was read from; None for a table of another file
-    # If this is a point mass on three cables that stand for pairs of six: the robot to which it is equivalent.
+    # The platform on six cables to which this point mass on three is equivalent, if it is.
     _platform: "RobotFile | None" = PrivateAttr(None)
     cable_diameter: Annotated[float, Field(ge=0, le=LARGEST_LENGTH)] | None = Field(
         None, description="diameter of the cables, for distances between bodies, m (default 0)"
@@ -106,7 +106,7 @@ class RobotFile(LimitKeys):
 
     @property
     def own_pattern(self) -> str:
-        """Motions of the effector, as the keys say."""
+        """Pattern of the effector's motions that follows from the keys."""
         return self.pattern or ("3R3T" if self.is_platform else "2T" if self.planar else "3T")
 
     @property
@@ -165,7 +165,7 @@ class RobotFile(LimitKeys):
         return self
 
     def parallel_pairs(self) -> ParallelPairs:
-        """Pairs of a platform's cables, `robots.model.parallel_pairs`."""
+        """Pairs of parallel cables of a platform; see `robots.model.parallel_pairs`."""
         if self.platform_points is None:
             raise InputError("platform_points", None, "given", problem="it has no platform_points")
         if self.own_pattern != "3R3T":
@@ -177,7 +177,7 @@ class RobotFile(LimitKeys):
 
     @property
     def as_written(self) -> "RobotFile":
-        """The robot of the file, also where this one is its equivalent."""
+        """The robot of the file: the platform, if this is its equivalent point mass."""
         return self._platform or self
 
     @property
@@ -187,11 +187,11 @@ class RobotFile(LimitKeys):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Plain values that decide about motions: the file's keys, and translation_only of an equivalent."""
+        """Plain values on which motions depend: keys of the file, and translation_only of an equivalent."""
         return self.as_written.model_dump(mode="json", exclude_none=True)
 
     def equivalent(self) -> "RobotFile":
-        """The point mass on three cables that this platform on six in parallel pairs is."""
+        """The point mass on three cables to which this platform on six cables in parallel pairs is equivalent."""
         exits = self.parallel_pairs().exit_points.tolist()
         others = ("inertia", "centre_of_mass", "pattern", "translation_only")
         absent = dict.fromkeys(("platform_points", *others))
@@ -215,11 +215,11 @@ class RobotFile(LimitKeys):
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:
-        """File and dotted name of a key of the robot, for errors."""
+        """File and dotted name by which errors refer to a key of the robot."""
         return (file, f"robot.{key}") if self._file is None else (self._file, key)
 
     def typed(self, error: InputError) -> str:
-        """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes."""
+        """Text of an error about this robot, with numbers as in the file instead of in the kernels' axes."""
         value = getattr(self, error.key, None)
         if error.problem or value is None:
             return f"robot.{error}"
@@ -267,7 +267,7 @@ def _missing(reference: str, file: object, path: Path) -> ConfigError:
 
 
 def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:
-    """A robot file of another program, `config.formats`."""
+    """Read a robot file of another program; see `config.formats`."""
     imported = read(path, cable_set)
     robot_file = checked(RobotFile, imported.spec, path)
     robot_file._file, robot_file._notes = path, imported.warnings

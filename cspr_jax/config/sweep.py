@@ -60,7 +60,7 @@ _OF_STARTS = "{} of the start points, m, in place of trajectory.from"
 
 
 class Axes(Table):
-    """The grid is the product of its axes; their order in the file is the order of the result's dimensions."""
+    """Axes of the grid, which is their product; their order is that of the dimensions of the result."""
 
     x: Axis | None = Field(None, description=_OF_TARGETS.format("x"))
     y: Axis | None = Field(None, description=_OF_TARGETS.format("y"))
@@ -191,7 +191,7 @@ class RunTable(Table):
 
 
 class _SweepKeys(Table):
-    # Keys of a sweep except those of obstacles, which the reference lists after these.
+    # Keys of a sweep except those of obstacles, so that the reference lists obstacles last.
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")

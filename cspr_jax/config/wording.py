@@ -1,4 +1,4 @@
-"""Errors of a file, one line each in the words of TOML: no word of the library that checks it."""
+"""Errors of a file, one line each in the words of TOML, without terms of the library that checks it."""
 
 import datetime
 import math
@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from cspr_jax.errors import demand, shown
 from cspr_jax.errors.suggestions import look_alike, nearest
 
-# Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
+# First letter of the names of variants of a union, which pydantic's location of an error contains but no key does.
 VARIANT = "~"
 TABLE_ERROR = "table_error"
 LONGEST_NAME = 200
@@ -37,7 +37,7 @@ _BOUNDS = {
 
 
 def table_error(key: str, value: object, allowed: str) -> PydanticCustomError:
-    """Error that a validator of a table raises about one of its keys, or about several together."""
+    """Error that a validator of a table raises about one key, or about several keys together."""
     text = value if isinstance(value, str) else shown(value)
     return PydanticCustomError(TABLE_ERROR, "{allowed}", {"key": key, "given": text, "allowed": allowed})
 
@@ -62,7 +62,7 @@ def name_of(get_names: Callable[[], Collection[str]]) -> PlainValidator:
 
 
 def rank(error: ErrorDetails) -> int:
-    """Order of an error among those of a file: an error that explains others goes first."""
+    """Rank of an error among those of a file: errors that explain others come first."""
     if error["loc"] == ("schema",) and error["type"] != "missing":
         return 0
     return 1 if error["type"] == "extra_forbidden" else 2
@@ -70,7 +70,7 @@ def rank(error: ErrorDetails) -> int:
 
 def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
     """One error as a line."""
-    # The last part of an unknown or missing key is the user's own, whatever it looks like.
+    # The last part of an unknown or missing key is the user's word, even if it looks like a name of pydantic.
     last_part = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
     parts = [part for part in error["loc"][: len(error["loc"]) - len(last_part)] if not str(part).startswith(VARIANT)]
     parts += last_part
@@ -89,7 +89,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
 
 
 def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # The question guesses what a string, or a number in place of a list, stands for.
+    # Guess what was meant by a string, or by a number in place of a list.
     value, key = error["input"], str(parts[-1]) if parts else ""
     if not isinstance(value, str):
         is_single = error["loc"][-1:] == ("~values",) and isinstance(value, int | float) and not isinstance(value, bool)
@@ -150,7 +150,7 @@ def _kind_of(value: object) -> str:
 
 
 def _explained(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # Return the description of the key, where the error is about the whole key.
+    # Return the description of the key if the error is about its whole value.
     if not parts or isinstance(parts[-1], int):
         return ""
     field = _table_at(model, parts[:-1]).get(str(parts[-1]))
@@ -174,7 +174,7 @@ def _suggestion(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _elsewhere(model: type[BaseModel], parts: list[Any]) -> str:
-    # Return the key in another table of the file, if it is only misplaced.
+    # Return where in the file an unknown key would be right, if it is only misplaced.
     top, name = _table_at(model, []), str(parts[-1])
     if len(parts) > 1 and name in top:
         return f"{name} above the first [table]"
@@ -191,7 +191,7 @@ def _description(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _table_at(model: type[BaseModel], parts: list[Any]) -> dict[str, Any]:
-    # Return the fields of the table in which an error lies, by the keys that users write.
+    # Return the fields of the table that has the error, by the keys that users write.
     for part in parts:
         field = {f.alias or n: f for n, f in model.model_fields.items()}.get(str(part))
         inner = _tables_in(field.annotation) if field else [model]

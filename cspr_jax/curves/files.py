@@ -25,11 +25,11 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.robots.statics.reference_pose import aligned
 
-MANY = 30  # samples, at least, of a motion that is no sequence of waypoints
-MOVING = 0.2  # part of the largest speed that counts as moving
-AT_REST = 1e-6  # m/s; slower samples are at rest but for rounding
-BESIDE = 1e-9  # part of the largest coordinate by which rounding takes a motion off the plane or the guide of a robot
-JOINT_STAYS = 1e-6  # m; a joint that moves less stays: tables of six decimals are rounded
+MANY = 30  # samples; motions with fewer may be sequences of waypoints
+MOVING = 0.2  # an end that is faster than this fraction of the largest speed moves
+AT_REST = 1e-6  # m/s; samples that are slower are at rest, but for rounding
+BESIDE = 1e-9  # fraction of the largest coordinate by which rounding may move a robot off its plane or guide
+JOINT_STAYS = 1e-6  # m; a joint that moves less is taken as fixed: tables of six decimals are rounded
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -73,7 +73,7 @@ def source_spline(
 
 
 def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
-    """A motion that a robot of a pattern can follow; coordinates that must not move lose their rounding errors."""
+    """Check that a robot of a pattern can follow a motion; remove rounding errors of coordinates that must not move."""
     row, position = PATTERNS[pattern], np.array(spline.position)
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
     if is_planar and not row.is_planar:
@@ -102,7 +102,7 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
 
 
 def moving_ends(source: Any, ends: str | None) -> list[str]:
-    """Hints of samples that move at an end where the curve is taken to be at rest."""
+    """Hints about samples that move at an end where the curve is assumed to be at rest."""
     if not isinstance(source, MotionTable) or source.velocities is not None or (ends or source.ends) is not None:
         return []
     lines, times, positions = [], source.times, source.positions
@@ -128,7 +128,7 @@ def placed_inward(
     turning = spline.quaternion
     if turning is not None:
         units = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)
-        # A product is linear in the quaternion, and so in its coefficients.
+        # The product is linear in the quaternion, so it applies to Bernstein coefficients too.
         turning = as_float64(products(units, (reference * BACK)[None]).reshape(turning.shape))
     moved = dataclasses.replace(spline, position=as_float64(frame.inward(spline.position)), quaternion=turning)
     if centre is None or not np.any(centre) or turning is None:
@@ -137,7 +137,7 @@ def placed_inward(
 
 
 def centre_from(robot_file: RobotFile, point: str | None) -> Float[np.ndarray, "3"] | None:
-    """Mass centre of a platform from the point whose positions a motion has."""
+    """Offset from the point whose positions a motion has to the mass centre; None where the two are the same."""
     centre, is_jointed = robot_file.centre_of_mass, PATTERNS[robot_file.own_pattern].is_jointed
     return None if centre is None or is_jointed or point != "origin" else np.asarray(centre)
 

@@ -1,8 +1,8 @@
-"""Interpolation of samples in time: the piecewise polynomial that a controller plays of a table.
+"""Interpolation of samples in time: the piecewise polynomial that a controller makes of a table.
 
-`INTERPOLATIONS` are C2 cubic and C4 quintic splines through the samples, and Hermite pieces, cubic from velocities and
-quintic from accelerations too. Quaternions are made continuous in sign, interpolated by themselves, and normalised
-afterwards; where positions are Hermite pieces, quaternions are a spline of the same degree.
+`INTERPOLATIONS` are C2 cubic and C4 quintic splines through the samples, and Hermite pieces: cubic from velocities,
+quintic where accelerations are given too. Quaternions are made continuous in sign, interpolated by components, and
+normalised afterwards; where positions are Hermite pieces, quaternions are a spline of the same degree.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from cspr_jax.numerics.shapes import Float
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")
-# The ends of a periodic motion differ by no more than this part of its largest number.
+# The ends of a periodic motion differ by no more than this fraction of its largest coordinate.
 PERIODIC = 1e-9
-# Samples closer in time than this have accelerations beyond all numbers.
+# Accelerations between samples that are closer in time than this would overflow.
 MIN_STEP = 1e-12  # s
-JUMP = 1e-6  # part of the largest acceleration by which one jumps, but for rounding, where legs meet
+JUMP = 1e-6  # where legs meet, smaller differences, as fractions of the largest acceleration, are rounding
 
 
 def interpolated(
@@ -41,7 +41,7 @@ def interpolated(
     end_velocities: Float[np.ndarray, "2 3"] | None = None,
     end_accelerations: Float[np.ndarray, "2 3"] | None = None,
 ) -> Spline:
-    """Motion through samples."""
+    """Spline through the samples of a motion."""
     times = np.asarray(times, float)
     _check(times, positions, quaternions, interpolation, ends)
     if interpolation == "hermite" and velocities is None:
@@ -90,7 +90,7 @@ def check_order(times: Float[np.ndarray, "n"], *, repeated: bool) -> None:
 
 
 def check_steps(times: Float[np.ndarray, "n"]) -> None:
-    """Refuse times that are too close for numbers."""
+    """Refuse times that are so close that accelerations would overflow."""
     steps = np.diff(times)
     close = np.flatnonzero((steps > 0.0) & (steps < MIN_STEP))
     if len(close):
@@ -137,8 +137,8 @@ def _check_closed(values: np.ndarray, name: str) -> None:
 def _spline(
     times: np.ndarray, values: np.ndarray, degree: int, ends: str, derivatives: np.ndarray | None = None
 ) -> np.ndarray:
-    # Bernstein coefficients of each piece, (n - 1, degree + 1, width); derivatives (2, 2, width) of first and second
-    # order at both ends, NaN where `ends` decides.
+    # Return Bernstein coefficients of each piece, (n - 1, degree + 1, width). `derivatives` (2, 2, width) are the first
+    # and second one at each end, NaN where `ends` decides.
     if ends == "periodic":
         return _periodic(times, values, degree)
     if derivatives is None:
@@ -150,7 +150,7 @@ def _spline(
         prescribed = [(order, value) for order, value in zip((1, 2), end, strict=True) if not np.isnan(value).any()]
         rest = [(order, zero) for order in (1, 2)]
         usual = rest if ends == "rest" else free
-        # Conditions of `ends` take the place of those that are not prescribed.
+        # Derivatives that are not prescribed follow `ends`.
         conditions.append((prescribed + [pair for pair in usual if pair[0] not in dict(prescribed)])[: degree // 2])
     if degree == 3:
         return _pieces(CubicSpline(times, values, bc_type=(conditions[0][0], conditions[1][0])))
@@ -159,7 +159,7 @@ def _spline(
 
 
 def _periodic(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:
-    # A quaternion that comes back with the other sign, after a whole turn, does so twice in two periods.
+    # After a full turn a quaternion returns with the opposite sign: it repeats after two periods.
     sign = 1.0 if np.sum(values[0] * values[-1]) >= 0.0 else -1.0
     times = np.concatenate([times, times[1:] + times[-1]])
     values = np.concatenate([values[:-1], sign * values[:-1], values[:1]])
@@ -213,7 +213,7 @@ def thinned(spline: Spline, first: int) -> Spline:
 
 
 def _sides(table: np.ndarray, width: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    # Values and derivatives that samples of pieces of this degree have, at the starts and at the ends of the pieces.
+    # Values and derivatives of the pieces at their starts and ends, up to the order that Hermite pieces prescribe.
     degree, factor, pairs = table.shape[1] - 1, np.ones_like(width), []
     for order in range(degree // 2 + 1):
         differences = np.diff(table, order, axis=1)

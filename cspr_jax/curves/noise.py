@@ -12,20 +12,21 @@ from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.curves.interpolation import continuous
 from cspr_jax.numerics.shapes import Float
 
-WINDOW = 96  # samples in which noise is estimated at a time
+WINDOW = 96  # number of consecutive samples from which noise is estimated at a time
 MAX_WINDOWS = 16
-ORDERS = range(2, 13)  # of differences
+ORDERS = range(2, 13)  # orders of the differences that are tried
 # Median of the absolute value of a normal variable, over its standard deviation.
 MEDIAN = 0.6745
-# Standard deviation of the second derivative of a cubic spline through white noise of 1 at times 1 apart.
+# Standard deviation of the second derivative of a cubic spline through white noise of unit variance at unit steps.
 BENDING = 6.0
 GRAVITY = 9.81
-ACCELERATION = 0.02  # part of gravity, and of the motion's own acceleration, that noise may have
-JUMP_FRACTION = 0.01  # smallest fraction of the samples at which the acceleration jumps by that
-# With more noise, as a fraction of the range of positions, samples are waypoints, unless their steps are short, s.
+ACCELERATION = 0.02  # noise may cause accelerations up to this fraction of gravity and of the motion's largest one
+JUMP_FRACTION = 0.01  # smallest fraction of the samples at which noise makes the acceleration jump by more
+# Samples that scatter by more than this fraction of the range of positions are waypoints, unless their time steps are
+# at most CLOSE, s.
 SCATTER, CLOSE = 0.05, 0.02
-DECIMALS = range(9)  # at which files round
-ONE_STEP = 0.1  # fraction of the third differences that are not 0
+DECIMALS = range(9)  # numbers of decimals to which files may be rounded
+ONE_STEP = 0.1  # smallest fraction of the nonzero third differences of rounded samples that are one step
 MIN_SAMPLES = 32
 
 
@@ -35,9 +36,9 @@ class Noise:
 
     Fields:
         deviation: standard deviation, in the unit of the samples.
-        bending: standard deviation of their second derivatives due to it, per s^2.
+        bending: standard deviation of the second derivatives that the noise causes, per s^2.
         jump: median jump of the second derivative of the spline through the samples, per s^2.
-        step: to which the samples are rounded, if that is the noise; 0: it is not.
+        step: step to which the samples are rounded, if rounding is the noise; else 0.
     """
 
     deviation: float
@@ -47,7 +48,7 @@ class Noise:
 
 
 def noise_notes(table: MotionTable, *, radius: float = 1.0) -> list[str]:
-    """Noise that makes the accelerations of a table useless."""
+    """Notes about noise that makes the accelerations of a table useless."""
     parts = [("accelerations jump", "m/s^2", "m", table.positions, 1.0)]
     if table.quaternions is not None:
         parts.append(("angular accelerations jump", "rad/s^2", "rad", 2.0 * continuous(table.quaternions), radius))
@@ -93,7 +94,7 @@ def noise_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]
 
 
 def _calm(times: np.ndarray, values: np.ndarray, step: float, deviation: float) -> float:
-    # Largest second derivative of so few of the samples that noise adds little to it.
+    # Largest second derivative through every n-th sample, with n so large that noise adds little to it.
     stride = 1
     while len(times) // stride > 8 and BENDING * deviation / (stride * step) ** 2 > ACCELERATION * GRAVITY / 4.0:
         stride *= 2
@@ -121,7 +122,7 @@ def _deviation(times: np.ndarray, values: np.ndarray) -> float:
 
 
 def _rounding(values: np.ndarray) -> float:
-    # Step to which samples are rounded: a power of ten that divides all of them; 0: none that is coarse.
+    # Step to which samples are rounded: the largest power of ten that divides all of them; 0 where there is none.
     sample = values[:: max(len(values) // 1000, 1)]
     for decimals in DECIMALS:
         scaled = sample * 10.0**decimals
@@ -139,7 +140,7 @@ def _is_rounded(values: np.ndarray, step: float) -> bool:
 
 
 def deviation_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]) -> float:
-    """Standard deviation of the noise of the first samples; what rounding leaves is noise too."""
+    """Standard deviation of the noise of the first samples, rounding errors included."""
     spread, step = _deviation(times[:WINDOW], values[:WINDOW]), _rounding(values)
     return step / math.sqrt(12.0) if _is_of_rounding(step, spread, values) else spread
 

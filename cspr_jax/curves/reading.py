@@ -1,8 +1,8 @@
-"""Motions that users bring as splines: tables of samples, pieces of other programs, and curves of SciPy.
+"""Splines from what users bring: tables of samples, pieces of other programs, and curves of SciPy.
 
-Tables become what their interpolation says; pieces stay exactly as they are. Tables that are too long for memory are
-read and interpolated window by window (`config.motions.text.windows`), each with so many rows of its neighbours that
-the pieces of the window are those of the spline through all rows, to rounding.
+Tables are interpolated as they say; pieces stay exactly as they are. Tables that are too long for memory are read and
+interpolated window by window (`config.motions.text.windows`), each with enough rows of its neighbours that its pieces
+equal those of the spline through all rows, up to rounding.
 """
 
 import dataclasses
@@ -22,11 +22,11 @@ from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 
-# Parts of the largest coefficient:
-PIECES_ERROR = 1e-6  # by which pieces may miss each other
-WINDOWS_ERROR = 1e-9  # by which windows may
-COEFFICIENT_ERROR = 1e-12  # of coefficients
-# Columns of curves, as indices of x, y, z and the quaternion.
+# Tolerances, as fractions of the largest coefficient:
+PIECES_ERROR = 1e-6  # of the gap where two pieces meet
+WINDOWS_ERROR = 1e-9  # of the gap where two windows meet
+COEFFICIENT_ERROR = 1e-12  # of the rounding of coefficients
+# What the columns of a curve are, by their number: indices of x, y, z and the quaternion.
 _WIDTHS = {2: (0, 2), 3: (0, 1, 2), 7: (0, 1, 2, 3, 4, 5, 6)}
 
 
@@ -58,7 +58,7 @@ def spline_of(
 
 
 def pieces_of(curve: Any) -> MotionPieces:
-    """A curve of SciPy, exactly."""
+    """Pieces of a curve of SciPy, converted exactly."""
     if isinstance(curve, BSpline):
         knots = np.unique(curve.t[curve.k : len(curve.t) - curve.k])
         orders = range(curve.k + 1)
@@ -128,7 +128,7 @@ def _of_pieces(pieces: MotionPieces, interpolation: str | None, ends: str | None
 
 
 def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndarray) -> None:
-    # A mass follows no jump, whatever pulls it.
+    # No force makes a mass follow a jump of its position or velocity.
     degree = table.shape[1] - 1
     starts, ends = degree * (table[:, 1:2] - table[:, :1]), degree * (table[:, -1:] - table[:, -2:-1])
     for words, first, last, scale in (
@@ -180,7 +180,7 @@ def _without_joins(table: MotionTable) -> MotionTable:
 
 
 def _check_window(before: Spline, after: Spline) -> None:
-    # Taylor coefficients of both at the time at which they meet, by the smaller of the two pieces there.
+    # Compare Taylor coefficients of both windows where they meet, over the shorter of the two pieces there.
     steps = [float(np.diff(np.asarray(spline.knots))[index]) for spline, index in ((before, -1), (after, 0))]
     step = min(steps)
     for name in ("position", "quaternion"):

@@ -1,4 +1,4 @@
-"""Smoothing of samples: the curve of least second derivative that misses them by a standard deviation."""
+"""Smoothing of samples: the curve of smallest second derivative that stays within their noise."""
 
 import dataclasses
 import math
@@ -17,20 +17,21 @@ from cspr_jax.curves.noise import deviation_of
 from cspr_jax.errors import InputError
 
 MIN_SAMPLES = 5
-LOWEST = -8.0  # power of ten of the weight of the second derivative (time in steps) at which curves meet all samples
+# Weights of the second derivative (time in steps) are powers of ten; with the lowest, curves meet all samples.
+LOWEST = -8.0
 HIGHEST = 24.0
-STEPS = 4.0  # steps of the power in the search for an upper bound of it
-POWER_ERROR = 1e-4  # error of the power
-REFINEMENTS = 3  # of solutions, whose matrices are badly conditioned where weights are large
-# A record moves at an end if rest there costs too much: ratios of the sum of squared errors of a polynomial at rest to
-# that of a moving one, and of the squared second derivatives of a smoothed curve at rest to those of a moving one.
+STEPS = 4.0  # increment of the power in the search for its upper bound
+POWER_ERROR = 1e-4  # tolerance of the search for the power
+REFINEMENTS = 3  # number of iterative refinements: matrices are badly conditioned where weights are large
+# A record moves at an end if assuming rest there raises the squared errors of a polynomial by FACTOR, and the squared
+# second derivatives of the smoothed curve by COSTS.
 FACTOR = 2.0
 COSTS = 1.03
-SURE = 4.0  # standard deviations of the noise by which the first sum must be larger
+SURE = 4.0  # standard deviations, of the sum of squared errors, that are ascribed to noise
 FITS = 1.2  # a polynomial fits samples that it misses by less than this multiple of their noise
-SAMPLE_ERROR = 1e-9  # of the samples
-_COUNTS = np.unique(np.geomspace(6.0, 256.0, 20).astype(int))  # of samples that tell the speed at an end
-REST, MOVING = (1, 2), ()  # derivatives that are 0 at an end
+SAMPLE_ERROR = 1e-9  # rounding error of samples, as a fraction of the largest
+_COUNTS = np.unique(np.geomspace(6.0, 256.0, 20).astype(int))  # numbers of samples from which an end's speed is found
+REST, MOVING = (1, 2), ()  # orders of the derivatives that are 0 at an end at rest, and at a moving one
 
 
 def smoothed(
@@ -41,11 +42,11 @@ def smoothed(
     interpolation: str | None = None,
     ends: str | None = None,
 ) -> MotionTable:
-    """A table without the noise of its samples: a smoothing spline, which misses them by a standard deviation.
+    """Replace the samples of a table by those of a smoothing spline, which deviates by as much as they are noisy.
 
-    Of all splines that miss the samples by no more in the root mean square, it has the least second derivative in the
-    mean square (Reinsch, Numerische Mathematik 10, 1967) among those with the same ends: at rest, velocity and
-    acceleration, where the record is at rest or `ends` says so, and free where the record moves.
+    Among splines with the same end conditions and no larger root-mean-square deviation from the samples, it has the
+    smallest mean square of the second derivative (Reinsch, Numerische Mathematik 10, 1967). An end has zero velocity
+    and acceleration where the record is at rest or `ends` says so, and is free where the record moves.
     """
     angle = deviation if angle is None else angle
     for key, value in (("smooth", deviation), ("smooth (angle)", angle)):
@@ -70,7 +71,7 @@ def smoothed(
     ]
     is_told = ends is None
     if ends is None and any(map(any, moving)):
-        ends = "natural"  # to which a spline at rest, of no acceleration at its end, belongs as well
+        ends = "natural"  # also true of a spline at rest, whose acceleration is 0 at its end
         if kind == "quintic":
             moving = [[True, True]] * len(groups)
     results, notes = [], [*table.notes]
@@ -96,7 +97,7 @@ def smoothed(
 
 
 class _Fit:
-    """Splines with knots at some of the samples, and how they miss all of them; times are in steps."""
+    """Splines with knots at some of the samples, fitted to all of them; times are in steps."""
 
     def __init__(
         self, times: np.ndarray, knots: np.ndarray, values: np.ndarray, degree: int, is_periodic: bool
@@ -156,8 +157,8 @@ class _Fit:
         return may_move
 
     def _smoothest(self, deviation: float, conditions: list, values: np.ndarray) -> np.ndarray:
-        # A curve that must come to rest in its last step may miss the samples, or bend more than the one through them:
-        # then its velocity alone is 0 there.
+        # A curve that must come to rest within one step may miss the samples, or bend more than the curve through them:
+        # then only its velocity is 0 at its ends.
         smoothest = self._weighed(deviation, self._space(conditions), values)
         relaxed = [condition[:1] for condition in conditions]
         if self.degree == 5 or relaxed.count(REST[:1]) != 2 or self.is_periodic:
@@ -196,7 +197,7 @@ class _Fit:
         return float(((self.bending @ coefficients) ** 2).sum())
 
     def _space(self, conditions: list) -> csr_array:
-        # Coefficients of the curves that keep the conditions at both ends, by those that are free.
+        # Matrix from free coefficients to all coefficients of the curves that meet the conditions at both ends.
         count = self.design.shape[1]
         if self.is_periodic:
             inner = count - self.degree
@@ -208,7 +209,7 @@ class _Fit:
         return csr_array(block_diag([blocks[0], eye_array(inner), blocks[1]]))
 
     def _end(self, orders: tuple[int, ...], is_last: bool) -> np.ndarray:
-        # Coefficients next to an end, by the free ones, if derivatives of these orders are 0 there.
+        # Matrix from free coefficients to those next to an end at which derivatives of these orders are 0.
         count = max(orders, default=0) + 1
         free = [k for k in range(count) if k not in orders]
         block = np.zeros((count, len(free)))
@@ -228,7 +229,7 @@ def _rms(away: np.ndarray) -> float:
 
 
 def _knots(times: np.ndarray) -> np.ndarray:
-    # Indices of samples that are not much closer to each other than others: the rest count as samples alone.
+    # Indices of the samples that become knots; those much closer together than the median step do not.
     minimum, indices = float(np.median(np.diff(times))) / CLOSER, [0]
     if np.diff(times).min() >= minimum:
         return np.arange(len(times))
@@ -262,13 +263,13 @@ def _derivatives(table: np.ndarray, degree: int, orders: int) -> dict[int, csr_a
 
 
 def _may_move(times: np.ndarray, values: np.ndarray) -> list[bool]:
-    # Tell whether samples seem to move at the start and at the end, beyond their noise.
+    # Tell, for the start and the end, whether samples move by more than their noise.
     return [_moves(times - times[0], values), _moves(times[-1] - times[::-1], values[::-1])]
 
 
 def _moves(times: np.ndarray, values: np.ndarray) -> bool:
-    # Tell whether a polynomial with a speed at the start fits samples far better than one without, over as many of
-    # them as one of the two fits but for noise.
+    # Tell whether a polynomial with a speed at the start fits samples far better than one without, over as many
+    # samples as at least one of the two fits within their noise.
     noise, missed = deviation_of(times, values), (0.0, 0.0)
     for count in _COUNTS[: np.searchsorted(_COUNTS, len(times), "right")]:
         powers = (times[:count, None] / times[count - 1]) ** np.arange(5)

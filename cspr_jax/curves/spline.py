@@ -1,4 +1,4 @@
-"""Piecewise polynomial motion: what a table of samples or way-points and an interpolation are, in Bernstein form."""
+"""Piecewise polynomial motion in Bernstein form: a table of samples or waypoints, interpolated."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
-BATCH = 256  # parts of blocks whose rotations are bounded at a time
-# Numbers of pieces that numbers are rounded up to; copies of longer tables would cost more than compiling.
+BATCH = 256  # number of parts of blocks whose rotations are bounded at a time
+# The number of pieces is rounded up to one of these; longer tables stay, since copies cost more than compiling.
 USUAL = (64, 256, 1024, 4096)
 
 
@@ -37,11 +37,11 @@ class Spline:
     Fields:
         knots: (m + 1,) times between the m pieces, the first 0, increasing; s.
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
-        quaternion: (m, degree + 1, 4) likewise, scalar first, continuous, of any length but 0; None for a point mass.
+        quaternion: (m, degree + 1, 4) likewise, scalar first, continuous, of any norm but 0; None for a point mass.
         z0: () depth at which slacks are normalised, m.
-        offset: (3,) from the point whose positions these are to the mass centre, platform axes, m; None: it is that.
+        offset: (3,) from the point whose positions these are to the mass centre, platform axes, m; None: they coincide.
         interpolation: how its samples were joined, one of `curves.interpolation.INTERPOLATIONS`, or "pieces".
-        ends: of the same, or "".
+        ends: conditions at its ends, one of `curves.interpolation.ENDS`, or "".
     """
 
     knots: Array
@@ -67,7 +67,7 @@ class Spline:
         return piece_state(jnp.asarray(self.position)[piece], quaternion, fraction, width, self.offset)
 
     def padded(self) -> "Spline":
-        """The same motion, its number of pieces rounded up: the first is repeated at its start, without a duration."""
+        """The same motion with its number of pieces rounded up, by copies of the first piece that last no time."""
         count = len(self.knots) - 1
         more = next((usual - count for usual in USUAL if usual >= count), 0)
         if more == 0:
@@ -231,7 +231,7 @@ def _rotations(quaternions):
 
 
 class SplineBatch:
-    """Splines of one degree, all of positions alone or all of orientations too, of any numbers of pieces."""
+    """Splines of one degree and any numbers of pieces; all of them have orientations, or none has."""
 
     def __init__(self, splines: Sequence[Spline]):
         """Join the tables."""

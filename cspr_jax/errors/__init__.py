@@ -1,4 +1,4 @@
-"""Errors on the host, and the exit code of each; what was probably meant is in `suggestions`."""
+"""Errors, and the exit code of each; `suggestions` finds what a user probably meant."""
 
 import datetime
 import enum
@@ -40,7 +40,7 @@ def _rebuilt(kind: type[CsprError], arguments: tuple, state: dict) -> CsprError:
 
 
 class InputError(CsprError, ValueError):
-    """A value that cannot be used, without the file it came from.
+    """A value that cannot be used; whoever reads a file adds the name of the file.
 
     Args:
         key: the key or argument, dotted.
@@ -93,7 +93,7 @@ class StoreError(CsprError):
 
 
 class ResourceError(CsprError):
-    """Memory, threads, processes or workers that do not suffice."""
+    """Too little memory, or too few threads, processes or workers."""
 
     exit_code = ExitCode.INPUT_OUTPUT
 
@@ -113,7 +113,7 @@ class StoppedError(CsprError):
         self.exit_code = exit_code
 
 
-# Containers are cut before they are written out: a user's may be nested thousands deep.
+# Levels and items of containers that messages show: a user's may be nested thousands deep.
 DEEPEST, LONGEST = 3, 12
 
 
@@ -123,7 +123,7 @@ def demand(allowed: str) -> str:
 
 
 def printable(text: object) -> str:
-    """Text that neither breaks a line nor commands a terminal, whoever wrote it: names, paths, records, logs."""
+    """Text of any origin (names, paths, records, logs) without characters that break a line or command a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text))
 
 
@@ -145,7 +145,7 @@ def _toml(value: object, depth: int) -> str:
 
 
 def _plain(value: object) -> str:
-    # Arrays are written over several lines.
+    # NumPy breaks long arrays into lines: join them.
     return str(value) if isinstance(value, datetime.date | datetime.time) else " ".join(repr(value).split())
 
 

@@ -22,7 +22,7 @@ Rule = Callable[[str, Any], None]
 LARGEST_LENGTH = 1e6  # m
 LARGEST_TIME = 1e12  # s; powers of times must not overflow
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
-UNBOUNDED = 10**9  # for numbers that functions bound more narrowly by themselves
+UNBOUNDED = 10**9  # maximum of numbers that the function itself bounds more narrowly
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Integer:
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """Rule of some types; also of objects with some attributes, whose type need not be imported for this check."""
+    """Rule of values of some types, or with some attributes, where importing the type would take time."""
 
     allowed: str
     kinds: tuple[type, ...] = ()
@@ -55,7 +55,7 @@ class Kind:
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """Another rule, and besides some strings or None that are let pass."""
+    """Rule that lets some strings or None pass, and applies another rule to all else."""
 
     rule: Rule
     others: tuple[str | None, ...]
@@ -74,7 +74,7 @@ class Choice:
 
 @dataclasses.dataclass(frozen=True)
 class Many:
-    """Rule of collections."""
+    """Rule of collections, each item of which another rule checks."""
 
     rule: Rule
     allowed: str
@@ -181,7 +181,7 @@ _FREQUENCIES = ("natural", "best", "fastest", "slowest")
 _FREQUENCY = 'a number > 0, rad/s, or "natural", "best", "fastest" or "slowest"'
 Frequency = Annotated[ArrayLike, Choice(Numbers(_FREQUENCY, positive=True, traced=True), _FREQUENCIES)]
 
-# As in robot files.
+# Bounds of lengths, as in robot files.
 LENGTHS: dict[str, Any] = {"minimum": -LARGEST_LENGTH, "maximum": LARGEST_LENGTH}
 POINTS = Numbers("finite numbers of shape (n, 3), n >= 1, at most 1e6 m", ((ANY, 3),), traced=True, **LENGTHS)
 _STARTS = "finite numbers of shape (3,) or (n, 3), at most 1e6 m"

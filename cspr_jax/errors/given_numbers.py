@@ -12,12 +12,12 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 
-# Sizes, times, rates and limits are within these bounds, in SI units: beyond, their squares and quotients vanish or
+# Lengths, times, rates and limits are within these bounds, in SI units: beyond them squares and quotients vanish or
 # overflow. No robot is near them.
 SMALLEST, LARGEST = 1e-9, 1e9
-# A shape has this in place of a length that may be any from 1 on.
+# Stands in a shape for any length from 1 on.
 ANY = None
-DEPTH = 4  # levels of lists and dictionaries that are searched for what jax traces
+DEPTH = 4  # levels of lists and dictionaries that are searched for tracers of jax
 
 
 def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
@@ -31,7 +31,7 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
         if values.dtype.kind in "iuf":
             return values.astype(float)
         if values.dtype.kind == "V" and values.dtype.names is None and np.can_cast(values.dtype, float):
-            return values.astype(float)  # bfloat16 and its like
+            return values.astype(float)  # bfloat16 and similar types
         if values.dtype.kind == "O" and all(_is_real(entry) for entry in values.flat):
             return np.array([float(entry) for entry in values.flat]).reshape(values.shape)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -57,13 +57,13 @@ class Numbers:
 
     Fields:
         allowed: in words, for errors.
-        shapes: that are allowed; `ANY` is a length from 1 on. None: all.
+        shapes: those allowed, where `ANY` stands for a length from 1 on; None: all.
         minimum: smallest number.
-        maximum: largest number; inf: none, and infinite ones are taken only with `infinite`.
+        maximum: largest finite number; inf: unbounded.
         positive: whether numbers must be from `SMALLEST` to `LARGEST`, above 0.
         infinite: whether inf is taken.
-        nan: whether NaN is taken, since the function itself says what it allows instead.
-        traced: whether what jax traces passes, where jax may trace a function.
+        nan: whether NaN is taken here, and refused by the function itself with a message of its own.
+        traced: whether tracers of jax pass, where jax may trace the function.
     """
 
     allowed: str
@@ -81,7 +81,7 @@ class Numbers:
             self.array(key, value)
 
     def array(self, key: str, value: Any) -> np.ndarray:
-        """The numbers."""
+        """The checked numbers as an array."""
         values = numbers(key, value, self.allowed)
         if self.shapes is not None and not any(_fits(values.shape, shape) for shape in self.shapes):
             if not values.ndim:
@@ -112,7 +112,7 @@ def _is_real(value: object) -> bool:
 
 
 def traced_part(value: Any, depth: int = DEPTH) -> str | None:
-    """Part of a value that jax traces, as Python writes it behind the value's name; None: none."""
+    """First tracer of jax within a value, as Python writes its access, such as "[0].mass"; None: there is none."""
     jax = sys.modules.get("jax")
     if jax is None or isinstance(value, jax.core.Tracer):
         return None if jax is None else ""
@@ -128,7 +128,7 @@ def traced_part(value: Any, depth: int = DEPTH) -> str | None:
 
 
 def refuse_tracers(key: str, value: Any, instead: str) -> None:
-    """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy."""
+    """Refuse tracers of jax anywhere in an argument of a function that computes with NumPy."""
     part = traced_part(value)
     if part is not None:
         error = "a tracer of jax, as grad, jit and vmap pass"

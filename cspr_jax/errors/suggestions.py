@@ -37,10 +37,10 @@ _SYNONYMS = {
 }
 # A height names the floor only where it cannot be a depth of P0 or a coordinate of targets.
 _HEIGHT = frozenset({"z0", "z"})
-ALIKE = 0.8  # share of letters with which two words count as one that is misspelt
-ENOUGH = 0.5  # share of all words of both keys
+ALIKE = 0.8  # smallest similarity, as `difflib` has it, of a word and its misspelling
+ENOUGH = 0.5  # keys are similar if they have more than this fraction of their words in common
 LETTERS = 0.6
-LONGEST = 100  # letters of the longest text that is compared
+LONGEST = 100  # letters; longer texts are not compared
 # Characters that word processors and web pages put in place of plain ones.
 _LOOK_ALIKES = {
     '"': "\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb\uff02",
@@ -74,7 +74,7 @@ def nearest(text: str, allowed: Iterable[str]) -> str | None:
 
 
 def look_alike(text: str) -> str:
-    """Clause for a message about text that holds a character that only looks like a plain one."""
+    """Clause of a message that names a character in a text that only looks like a plain one."""
     character = next((character for character in text if character in _PLAIN), "")
     if not character:
         return ""
@@ -83,13 +83,13 @@ def look_alike(text: str) -> str:
 
 
 def did_you_mean(text: str, allowed: Iterable[str]) -> str:
-    """The question for an error's line."""
+    """The question of an error message whether a similar name was meant."""
     near = nearest(text, allowed)
     return f"did you mean {near}? " if near else ""
 
 
 def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
-    """Demand of an error's line about a name: the one that was probably meant, then all of them."""
+    """What an error message asks for in place of a name: the one that was probably meant, then all of them."""
     names = list(names)
     allowed = allowed or f"one of {', '.join(names)}"
     question = did_you_mean(value, names) if isinstance(value, str) else ""
@@ -129,7 +129,7 @@ def _letters(first: str, second: str) -> float:
 
 
 def _common_fraction(first: list[str], second: list[str]) -> float:
-    # Return the share of words that both have, in all words of both.
+    # Return the number of common words over the number of all words of both.
     left, count = list(second), 0
     for word in first:
         near = difflib.get_close_matches(word, left, n=1, cutoff=ALIKE)

@@ -1,7 +1,7 @@
 """Motion: what every trajectory family provides, and what a plan asks of it.
 
-A motion is a pytree that gives its duration and the state at each time (`motion`). Slacks and peaks take any
-motion of any robot; answers, legs and waypoints are what families have in common. No file here knows a family.
+A motion is a pytree that gives its duration and its state at each time (`motion`). Slacks and peaks take any
+motion of any robot; answers, legs and waypoints are common to all families. No file of this package names a family.
 
 Files, each importing only from those above it:
 
@@ -15,8 +15,8 @@ Files, each importing only from those above it:
     slacks              slacks of any motion at one time
     peaks               extremes of tensions, heights, lengths and speeds along a motion
     acceleration_sets   feasible accelerations of a point mass
-    cause               a criterion that stands between a motion and feasible
+    cause               a criterion that a motion fails, in numbers
     answers             the record that every family returns
     waypoints           consecutive poses of a plan, as points of the kernels
-    leg                 consecutive poses that one family joins, and what comes of them beyond the motion
+    leg                 consecutive poses that one family joins, and results other than the motion
 """

@@ -33,11 +33,11 @@ def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"])
 def verdict(
     robot: PointMassRobot, faces: Faces, wider: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
 ) -> Int[Array, ""]:
-    """Verdict of an acceleration at one position, from the faces, and from those of limits as proofs take them."""
+    """Verdict of an acceleration at one position, from its faces and the faces of limits widened as for proofs."""
     rounding, slacks = wider.rounding(acceleration), wider.slacks(acceleration)
-    # Faces of limits may be touched.
+    # Faces that belong to limits may be touched.
     doubt = jnp.where(wider.offsets < faces.offsets, rounding, jnp.maximum(BOUNDARY * robot.gravity, rounding))
-    # A flat set has its margin beside its faces.
+    # A flat set has no inside: its margin is the distance beside it.
     flat = jnp.where(wider.is_regular, jnp.inf, wider.margin(acceleration))
     broken, is_beside = slacks < -doubt, flat < -jnp.max(doubt)
     is_out = jnp.where(wider.is_regular, broken.any(), is_beside)
@@ -61,10 +61,10 @@ class AccelerationRanges(NamedTuple):
 
     Fields:
         verdict: of rest there, flags of `Verdict`.
-        acceleration_margin: distance of rest from the nearest face, m/s^2: of the wrench-feasible workspace.
-        static_margin: the same without limits of the tensions, m/s^2: of the static workspace.
-        closure_margin: of the wrench-closure workspace, a pure number.
-        level_acceleration: largest magnitude of level accelerations that is feasible in every direction, m/s^2.
+        acceleration_margin: distance of rest from the nearest face, m/s^2; positive in the wrench-feasible workspace.
+        static_margin: the same without limits of the tensions, m/s^2; positive in the static workspace.
+        closure_margin: margin of wrench closure, a pure number; positive in the wrench-closure workspace.
+        level_acceleration: largest level acceleration that is feasible in all directions, m/s^2.
         level_acceleration_max: largest magnitude of a feasible level acceleration, m/s^2.
         upward_acceleration: largest upward acceleration, m/s^2.
         downward_acceleration: largest downward acceleration, m/s^2.
@@ -89,7 +89,7 @@ def acceleration_ranges(
     slack, margin = faces.slacks(at_rest), faces.margin(at_rest)
 
     def until(steepness: Array) -> Array:
-        # Return the largest acceleration along a direction, or along all directions that are so steep to the faces.
+        # Largest acceleration along the directions that have these components along the normals of the faces.
         distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
         return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
 
@@ -107,7 +107,7 @@ def acceleration_ranges(
 
 
 def _largest_level(faces: Faces, planar: bool) -> Array:
-    # The largest one is that of a corner of the level section; 0 where the section is empty.
+    # The largest level acceleration lies at a corner of the level section; 0 where the section is empty.
     normal, offset = faces.normals[:, :2], faces.offsets
     first, second = np.array(list(itertools.combinations(range(len(offset)), 2))).T
     a, b = normal[first], normal[second]
@@ -138,7 +138,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
 def along(
     robot: PointMassRobot, limits: Limits, position: Float[Array, "3"], direction: Float[Array, "3"]
 ) -> Float[Array, "2"]:
-    """Accelerations along a direction that are feasible at one position, Boralugoda (15) to (21) and figure 4.1."""
+    """Range of feasible accelerations along a direction at one position, Boralugoda (15) to (21) and figure 4.1."""
     faces = faces_at(robot, limits, position)
     steep = faces.normals @ direction
     ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)

@@ -1,7 +1,7 @@
 """Amplitude functions A(tau): how the amplitude of the swing grows from its start to its end.
 
-Each is a piecewise polynomial: values and derivatives are exact, a new function is a list of coefficients, and the
-largest value of any derivative is known, which proofs between samples need.
+Each is a piecewise polynomial, so that values and derivatives are exact, a new function is a list of coefficients, and
+proofs between samples know the largest value of any derivative.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")
 BOUNDARY_TOLERANCE = 1e-9
-# Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
+# Shorter curved ends would need accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
-# Tables have at least this many columns, so that few shapes have to be compiled; zeros change no bit.
+# Tables of coefficients have at least this many columns, padded with zeros, so that few shapes have to be compiled.
 COLUMNS = 6
 # Coefficients below this fraction of the largest one are negligible in the search for stationary points.
 NEGLIGIBLE = 1e-100
@@ -38,9 +38,9 @@ class Amplitude:
     """A piecewise polynomial on [0, 1].
 
     Fields:
-        knots: (n_pieces - 1,) where one piece ends and the next begins, increasing.
-        origins: (n_pieces,) point about which each piece is expanded.
-        coefficients: (n_pieces, 6 or more) of the powers of (tau - origin), lowest first.
+        knots: (n_pieces - 1,) values of tau where one piece ends and the next begins, increasing.
+        origins: (n_pieces,) values of tau about which each piece is expanded.
+        coefficients: (n_pieces, 6 or more) coefficients of the powers of (tau - origin), lowest first.
         largest: (6,) largest |A|, |A'|, ... |A^(5)| over [0, 1], rounded up.
         lowest: () smallest A over [0, 1].
         highest: () largest A over [0, 1].
@@ -85,7 +85,7 @@ def derivatives(amplitude: Amplitude, tau: Float[Array, "..."], *, order: int) -
 def local_bounds(
     amplitude: Amplitude, middle: Float[Array, "..."], radius: Float[Array, "..."]
 ) -> tuple[Float[Array, "..."], ...]:
-    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside."""
+    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval with no knot inside."""
     values = derivatives(amplitude, middle, order=HIGHEST_DERIVATIVE - 1)
     largest = amplitude.largest.astype(middle.dtype)
     return tuple(jnp.minimum(jnp.abs(v) + radius * largest[j + 1], largest[j]) for j, v in enumerate(values))
@@ -117,8 +117,7 @@ def from_pieces(
 
 
 def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
-    # Finding roots divides by the highest coefficient, and overflows where it is negligible; such a coefficient only
-    # adds roots far away.
+    # Root finding divides by the highest coefficient; a negligible one would overflow, and only adds roots far away.
     derivative = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
     stationary = derivative.roots() if derivative.degree() > 0 else np.zeros(0)
     # A double root may come out as a close complex pair: its real part is near enough to evaluate.

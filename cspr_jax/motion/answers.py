@@ -14,7 +14,7 @@ from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, NO_REASON, Verdict
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
-# Feasible motions may have this flag.
+# The only flag that feasible motions may have.
 FEWER = FLAGS(Verdict.FEWER_ARCS_UNDECIDED)
 
 
@@ -39,8 +39,8 @@ class Answers(Columns):
 
     Fields:
         arcs: (n,) smallest number of arcs proved feasible; 0: none.
-        tried_arcs: (n,) number of arcs of the motion that duration and margins belong to: `arcs`; if that is 0, the
-            candidate that one limit alone refuses; if there is none, the candidate with the largest margin.
+        tried_arcs: (n,) number of arcs to which duration and margins belong: `arcs` if that is not 0, else of the
+            candidate that fails a single limit, else of the candidate with the largest margin.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
@@ -48,8 +48,8 @@ class Answers(Columns):
         limit_margin: (n,) smallest slack of the limits; inf without limits.
         feasible_at_infinity: (n,) left-hand side of (2.55); positive if enough arcs make the segment feasible.
         tolerated: (n,) largest multiple of the uncertainty that the motion is proved to tolerate; NaN without one.
-        not_tolerated: (n,) smallest multiple for which a robot was found that fails.
-        margin_unit: of both margins.
+        not_tolerated: (n,) smallest multiple at which a robot was found that fails.
+        margin_unit: unit of both margins.
         proof: (n,) `SegmentProof` of each motion; None: it rests on a faster proof of its family alone.
     """
 
@@ -67,7 +67,7 @@ class Answers(Columns):
     proof: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0, object), kw_only=True)
 
     def __post_init__(self) -> None:
-        """Give segments without a proof None."""
+        """Fill in None as the proof of segments that have none."""
         if len(self.proof) != len(self.verdict):
             object.__setattr__(self, "proof", np.full(len(self.verdict), None))
 
@@ -112,7 +112,7 @@ def joined(parts: list[AnyAnswers]) -> AnyAnswers:
 def replaced(
     answers: AnyAnswers, index: Int[np.ndarray, "m"], others: Answers, chosen: Int[np.ndarray, "m"]
 ) -> AnyAnswers:
-    """Answers, some of which others replace."""
+    """Answers with some of them replaced by others."""
     columns: dict[str, Any] = {name: np.array(values) for name, values in answers.arrays().items()}
     for name, values in columns.items():
         values[index] = getattr(others, name)[chosen]

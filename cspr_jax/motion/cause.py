@@ -1,4 +1,4 @@
-"""Cause: a criterion that stands between a motion and feasible, in numbers."""
+"""Cause: a criterion because of which a motion is not feasible, in numbers."""
 
 import dataclasses
 import math
@@ -7,9 +7,9 @@ from typing import Any
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
-DIGITS, MOST_DIGITS = 3, 12  # of a number: at least, and at most, if fewer do not tell it from another one
-ON_PLANE = 1e-9  # m; a height above the spools that says nothing
-# By flag: what the motion does, in words; {cable} is "cable 1", or "cables 1 and 3".
+DIGITS, MOST_DIGITS = 3, 12  # digits of the numbers needed and allowed; more than DIGITS only where these look equal
+ON_PLANE = 1e-9  # m; heights above the spools up to this are rounding errors, which texts leave out
+# Text of each flag; {cable} is "cable 1", or "cables 1 and 3".
 _WORDS = {
     Verdict.SLACK_CABLE: "{cable} has {needed} {unit}{when}, at least {allowed} needed",
     Verdict.ABOVE_SPOOLS: "{missed} {unit} above the plane of the spools{when}",
@@ -32,15 +32,15 @@ _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 
 @dataclasses.dataclass(frozen=True)
 class Cause:
-    """A criterion that stands between a segment and feasible.
+    """A criterion because of which a segment is not feasible.
 
     Fields:
-        criterion: name of its flag, as verdicts have it.
-        cables: numbers from 0 on: of one cable, of two that touch, or none.
-        t: when it is broken by most, since the start of the segment, s; NaN where that is not known.
-        needed: what the segment has there, in the axes of the robot file; NaN likewise.
-        allowed: the most, or the least, that it may have.
-        unit: of both; "" where there are none.
+        criterion: name of its flag, as in verdicts.
+        cables: indices from 0 on: of one cable, of two that touch, or none.
+        t: time of the worst violation, from the start of the segment, s; NaN where it is not known.
+        needed: value of the segment at that time, in the axes of the robot file; NaN where it is not known.
+        allowed: largest, or smallest, value that is allowed.
+        unit: unit of both; "" where there are none.
         obstacle: name of the obstacle that is touched; "" where none is.
     """
 
@@ -84,7 +84,7 @@ class Cause:
 
 
 def _told_apart(first: float, second: float) -> tuple[str, str]:
-    # Write two numbers with so many digits that they differ.
+    # Write two numbers with as few digits as tell them apart.
     for digits in range(DIGITS, MOST_DIGITS + 1):
         texts = tuple(f"{value:.{digits}g}" for value in (first, second))
         if texts[0] != texts[1]:

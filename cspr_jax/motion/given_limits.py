@@ -40,7 +40,7 @@ def limits_of(
 
 
 def _narrowed(values: Mapping[str, Any], margin: float | None, n_cables: int, at: str) -> dict[str, Any]:
-    # Tension limits with a distance from both ends of their range.
+    # Tension limits, narrowed by a margin at both ends of their range.
     if margin is None:
         return {}
     low, high = values["tension_min"], values["tension_max"]
@@ -63,7 +63,7 @@ def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
 
 
 def check_bounded(limits: Limits) -> None:
-    """Refuse largest tensions of which some are infinite."""
+    """Refuse infinite largest tensions."""
     high = limits.tension_max
     if high is not None and not np.isfinite(high).all():
         raise InputError(
@@ -74,7 +74,7 @@ def check_bounded(limits: Limits) -> None:
 
 
 def check_of_motion(limits: Limits) -> None:
-    """Refuse limits of the mass centre's motion where none is checked."""
+    """Refuse limits of the mass centre's speed and acceleration in functions that do not check them."""
     for row in LIMITS:
         value = getattr(limits, row.name)
         if row.of_mass_centre and value is not None:
@@ -84,7 +84,7 @@ def check_of_motion(limits: Limits) -> None:
 def check_certain(
     robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
 ) -> None:
-    """Refuse an uncertainty where verdicts do not take it into account."""
+    """Refuse an uncertainty where no proof takes it into account."""
     uncertainty = limits.uncertainty
     if uncertainty is None:
         return
@@ -117,7 +117,7 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
 
 
 def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
-    """Limits of the three cables that stand for pairs of six."""
+    """Limits of the equivalent's three cables, from those of the pairs of six cables."""
     values: dict[str, Any] = {
         row.name: as_float64(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
         for row in LIMITS
@@ -141,7 +141,7 @@ def limits_over(
     any_tensions: bool = False,
     families: tuple[str, ...] = (),
 ) -> Limits:
-    """Limits, with those of a robot where none are given, as the kernels take them."""
+    """Limits in the kernels' axes, with those of a robot where none are given."""
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(merged)

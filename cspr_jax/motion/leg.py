@@ -25,7 +25,7 @@ class JoinedLeg:
     Fields:
         family: name of the family.
         answers: answers of the n segments.
-        motions: n motions, from the centroid of the spools, z down.
+        motions: n motions, origin at the centroid of the spools, z down.
     """
 
     family: str
@@ -59,21 +59,21 @@ class Leg(abc.ABC):
     """Consecutive poses of a plan, joined by one family.
 
     Fields:
-        step: between numbers of arcs that a segment can have; 0: segments have none.
+        step: step between the numbers of arcs that a segment can have; 0: its motions have no arcs.
 
     Raises:
         ConfigError: poses, or keys of the plan, that the family cannot use.
     """
 
     step: ClassVar[int] = 0
-    point: str | None = None  # point of the platform whose positions files have, if they say so
+    point: str | None = None  # point of the platform whose positions motion files give, if they say so
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""
         self.waypoints = waypoints
 
     def _refuse(self, *names: str) -> None:
-        # Refuse keys of poses that other families take; at its first pose another leg may have taken them.
+        # Refuse keys of poses that only other families take; those of the first pose may belong to the leg before.
         for i, pose in enumerate(self.waypoints.poses[1:], start=1):
             for key in names:
                 if getattr(pose, key) is not None:
@@ -90,11 +90,11 @@ class Leg(abc.ABC):
 
     @classmethod
     def for_searches(cls, waypoints: Waypoints) -> "Leg":
-        """The leg of the family over poses of another one, from whose motions a search can begin."""
+        """A leg of this family over the poses of another family, whose search can begin from its motions."""
         return cls(waypoints)
 
     def begin_with(self, others: "Sequence[Leg]") -> None:  # noqa: B027
-        """Take legs of other families over the same poses, from whose motions a search can begin."""
+        """Take legs of other families over the same poses; a search can begin from their motions."""
 
     @abc.abstractmethod
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:

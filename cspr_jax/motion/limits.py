@@ -1,4 +1,4 @@
-"""Limits of a state: which are set, the quantities that they bound, and the slacks that follow."""
+"""Limits of a state: those that are set, the quantities that they bound, and their slacks."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def limits_set(limits: Limits) -> tuple[Limit, ...]:
 
 
 def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:
-    """By how much a motion may miss a limit: a fraction of the limit; for the floor, of the radius of the spools."""
+    """Amount by which a motion may exceed a limit: a fraction of the limit; for the floor, of the spools' radius."""
     return TOUCHED * (np.asarray(spool_radius(robot)) if row.is_height else limit)
 
 
 def touchable_limits(robot: AnyRobot, limits: Limits) -> Limits:
-    """Limits as proofs take them, wider by `allowance`: to touch a limit is to keep it."""
+    """Limits widened by `allowance`, for proofs: a motion that touches a limit keeps it."""
     values = {row: np.asarray(getattr(limits, row.name), float) for row in limits_set(limits)}
     signs = {"most": 1.0, "least": -1.0}
     wider: dict[str, Any] = {
@@ -47,9 +47,9 @@ class Values(NamedTuple):
     Fields:
         tension: (n_cables,) N.
         depth: () z of the lowest point of the effector, z down, m.
-        length: (n_cables,) of the cables, m.
-        speed: (n_cables,) magnitude of the rate of the length, m/s.
-        acceleration: (n_cables,) magnitude of its second derivative, m/s^2.
+        length: (n_cables,) lengths of the cables, m.
+        speed: (n_cables,) magnitudes of their rates, m/s.
+        acceleration: (n_cables,) magnitudes of their second derivatives, m/s^2.
         mass_centre_speed: () m/s.
         mass_centre_acceleration: () magnitude, m/s^2.
     """
@@ -83,7 +83,7 @@ def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
 
 
 def scales(n_cables: int, weight: Float[Array, ""], z0: Float[Array, "..."]) -> dict[str, tuple[float, Array]]:
-    """Scales that make slacks dimensionless; the slack of a quantity that has none is relative to its limit."""
+    """Scales that make slacks dimensionless; slacks of quantities without a scale are relative to the limit."""
     return {"tension": (float(n_cables), weight), "depth": (1.0, z0)}
 
 
@@ -99,7 +99,7 @@ def slack(
 
 
 def other_limits(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are set, except those of tensions, which the margin of redundant cables contains."""
+    """Rows of the limits that are set, except limits of tensions, which the margin of redundant cables includes."""
     return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 

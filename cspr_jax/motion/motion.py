@@ -25,9 +25,9 @@ from cspr_jax.robots.model import state as states
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-# States that are computed at once.
+# Number of states that are computed at once.
 STATES = 64
-# Distance in time of a sample just before a joint of pieces, over that time.
+# Relative distance in time of the sample just before two pieces meet.
 BESIDE = 4.0 * np.finfo(float).eps
 
 jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
@@ -75,7 +75,7 @@ class BoundedMotion(Motion, Protocol):
         """Bounds of the states over blocks of time.
 
         Args:
-            start: (k,) s, increasing or not.
+            start: (k,) s, in any order.
             end: (k,) s, later than `start`.
 
         Returns:
@@ -155,7 +155,7 @@ class Placed(Generic[Kind]):
 
 
 def sample_times(motion: Motion, count: int, each: int = 4) -> Float[np.ndarray, "n"]:
-    """Times at which extremes of a motion are looked for: equidistant ones, and some in each piece and at its ends."""
+    """Normalised times at which extremes are searched for: equidistant ones, and some in each piece and at its ends."""
     breaks = np.asarray(motion.breaks(), float)
     edges = np.concatenate([[0.0], breaks, [1.0]])
     inner = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, each + 1)[1:-1]
@@ -164,12 +164,12 @@ def sample_times(motion: Motion, count: int, each: int = 4) -> Float[np.ndarray,
 
 
 def common_shape(motion: Kind) -> Kind:
-    """The same motion with pieces repeated until their number is a usual one, so that compiled code is shared."""
+    """The same motion, its pieces padded to a usual number so that motions share compiled code."""
     return jax.tree.map(lambda part: part.padded() if _is_in_pieces(part) else part, motion, is_leaf=_is_in_pieces)
 
 
 def has_pieces(motion: Motion) -> bool:
-    """Tell whether a motion has pieces, of which there may be very many."""
+    """Tell whether a motion consists of pieces, possibly of very many."""
     return any(map(_is_in_pieces, jax.tree.leaves(motion, is_leaf=_is_in_pieces)))
 
 

@@ -25,8 +25,8 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 
-SAMPLES = 64  # of an arc, at least
-BATCH = 512  # samples computed at a time
+SAMPLES = 64  # smallest number of samples of an arc
+BATCH = 512  # number of samples computed at a time
 # Largest number of samples that is held at a time.
 MAX_SAMPLES = 200_000
 
@@ -44,13 +44,13 @@ class Peaks:
         length_max: largest length of a cable, with what lies on its pulley, m.
         speed_max: largest speed of a cable, m/s.
         acceleration_max: largest acceleration of a cable, m/s^2.
-        mass_centre_speed: largest one, m/s.
-        mass_centre_acceleration: likewise, m/s^2.
-        tension_margin: smallest distance of tensions from their limits, of redundant cables the largest that all can
-            keep, N.
-        are_found: whether the rule of redundant cables found tensions within their limits at all times; 1 or 0.
+        mass_centre_speed: largest speed of the mass centre, m/s.
+        mass_centre_acceleration: largest acceleration of the mass centre, m/s^2.
+        tension_margin: smallest distance of tensions from their limits; of redundant cables, whose tensions can be
+            chosen, that of the most central ones, N.
+        are_found: whether the tension rule of redundant cables kept the limits at all times; 1 or 0.
         samples: number of times at which the motion was sampled.
-        when: when each of the extremes above is attained, (n, n_extremes), s.
+        when: time at which each of the extremes above is attained, (n, n_extremes), s.
         cables: which cable attains it, from 0 on; -1: none.
     """
 
@@ -71,7 +71,7 @@ class Peaks:
     cables: np.ndarray
 
 
-# A largest value is the smallest value of the negative.
+# A maximum is searched for as the minimum of the negative.
 _SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 EXTREMES = [field.name for field in dataclasses.fields(Peaks)][: len(_SIGNS)]
 
@@ -127,7 +127,7 @@ def peaks(
     corners: Float[np.ndarray, "m 3"] | None = None,
 ) -> Peaks:
     """Extremes along motions, narrowed down between samples."""
-    # One compiled function serves whichever limits are given.
+    # Give every limit of tensions a value, so that one compiled function serves all.
     limits = Limits(*tension_range(robot, limits))
     table = np.empty((len(motions), 3, len(EXTREMES)))
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]

@@ -7,8 +7,8 @@ class PlatformMotionKind(NamedTuple):
     """Kind of motions of a platform: a static argument of compiled functions.
 
     Fields:
-        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
-        plain: whether the time function of rotations is beta_1 of (3.66), whatever beta-hat is, or beta_ff of (3.93).
+        variable: True for hypocycloids of variable amplitude, (3.44), False for standard ones.
+        plain: True if rotations follow beta_1 of (3.66) for any beta-hat, False if they follow beta_ff of (3.93).
         from_rest: whether all segments start at rest in P0.
     """
 

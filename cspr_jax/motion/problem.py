@@ -1,4 +1,4 @@
-"""Problem that all motions of a question share: robot, limits, amplitude function."""
+"""Problem that all motions of a plan or map share: robot, limits, amplitude function."""
 
 from typing import Generic, NamedTuple, TypeVar
 
@@ -12,12 +12,12 @@ RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)
 
 
 class Problem(NamedTuple, Generic[RobotKind]):
-    """Robot, limits and amplitude function of a question, as the kernels take them.
+    """Robot, limits and amplitude function of a plan or map, as the kernels take them.
 
     Fields:
         robot: centred, z down; a platform in its reference axes.
         limits: limits beyond taut cables.
-        amplitude: A.
+        amplitude: amplitude function A.
     """
 
     robot: RobotKind
@@ -26,5 +26,5 @@ class Problem(NamedTuple, Generic[RobotKind]):
 
 
 def touchable(problem: Problem[RobotKind]) -> Problem[RobotKind]:
-    """The problem with its limits as proofs take them; see `limits.touchable_limits`."""
+    """The problem with limits widened for proofs; see `limits.touchable_limits`."""
     return problem._replace(limits=touchable_limits(problem.robot, problem.limits))

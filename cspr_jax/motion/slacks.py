@@ -1,7 +1,7 @@
 """Slacks of any motion: numbers that are positive exactly while a criterion is met, from the state at one time.
 
-They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. In this
-order, with n the number of cables, kappa_k the tension of cable k over its length, and values at rest in P0 below:
+They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. With n
+the number of cables and kappa_k the tension of cable k over its length, their order is:
 
     taut       kappa_k over its value at rest; for a point mass without pulleys, the pseudotension over its value at
                rest; for a platform, n z0 mu_k / g
@@ -44,7 +44,7 @@ def slacks(problem: Problem, motion: Motion, tau: Float[Array, ""]) -> Float[Arr
 
 
 def flags(problem: Problem) -> tuple[Verdict, ...]:
-    """Flag that each slack breaks."""
+    """Flag of the criterion of each slack."""
     robot, verdicts = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
     if isinstance(robot, PlatformRobot):
         verdicts.append(Verdict.SINGULAR)
@@ -81,5 +81,5 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Float
 
 
 def _per_length(robot: AnyRobot, state: State) -> Array:
-    # Return tensions per mass and length behind pulleys, 1/s^2.
+    # Tensions of cables behind pulleys, per mass and length, 1/s^2.
     return cables.tensions(robot, state) / cables.cable_motion(robot, state)[0] / robot.mass

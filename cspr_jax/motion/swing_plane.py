@@ -1,4 +1,4 @@
-"""The plane in which the effector swings between two points, and the precession of the ellipse of its swing in it."""
+"""The plane in which the effector swings between two points, and the precession of its elliptic swing in that plane."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def swing_plane(
 ) -> tuple[Float[Array, "3 2"], Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
     """Plane, radii and precession of a swing from one point to another.
 
-    A rest end makes it a straight line. Where start and end lie on one line through p0 and the arcs still need a
-    plane, it is the one least inclined to the spool plane.
+    A swing from or to rest is a straight line. Where start and end lie on one line through p0, the plane is the one
+    that is least inclined to the spool plane.
     """
     r1, r2 = length(v1), length(v2)  # (2.39)
     from_rest, to_rest = r1 < AT_P0 * scale, r2 < AT_P0 * scale
@@ -40,7 +40,7 @@ def swing_plane(
     distance = length(across)
     in_line = from_rest | to_rest | (distance < AT_P0 * scale)
     q2 = jnp.where(in_line, _least_inclined(normal, q1, x_axis), across / jnp.where(in_line, 1.0, distance))
-    # delta, not psi: its arctangent keeps its digits where psi is close to pi.
+    # Compute delta instead of psi: its arctangent keeps its digits where psi is close to pi.
     forward = jnp.where(from_rest | to_rest, 1.0, jnp.where(odd, -along, along))
     delta = jnp.arctan2(jnp.where(in_line, 0.0, distance), forward) / math.pi
     return jnp.stack([q1, q2], axis=1), jnp.where(from_rest, 0.0, r1), jnp.where(to_rest, 0.0, r2), delta

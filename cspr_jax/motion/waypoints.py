@@ -28,8 +28,8 @@ class Waypoints:
         family: name of the family that joins them.
         first: index, in the plan, of the first pose.
         last: index, in the plan, of the last pose.
-        fixed: (n_segments,) numbers of arcs in place of those of the poses, -m where they are free from m on; None:
-            those of the poses.
+        fixed: (n_segments,) numbers of arcs that replace those of the poses; -m: any number from m on. None: those of
+            the poses.
     """
 
     robot_file: RobotFile
@@ -52,7 +52,7 @@ class Waypoints:
 
     @property
     def arcs(self) -> np.ndarray:
-        """Number of arcs that is fixed for each segment, (n_segments,); 0 where it is free; see `fixed`."""
+        """Fixed number of arcs of each segment, (n_segments,); 0 where it is free; see `fixed`."""
         return np.array([pose.arcs or 0 for pose in self.poses[1:]]) if self.fixed is None else self.fixed
 
     @property

@@ -1,1 +1,1 @@
-"""Numerics: elementary functions that XLA compiles well, batches of one shape, cores, polynomials."""
+"""Numerics: functions that XLA compiles well, batches of one shape, bounds, searches, polynomials, tolerances."""

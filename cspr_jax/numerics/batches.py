@@ -1,7 +1,7 @@
 """Batches of one shape.
 
-XLA compiles for one shape, and the bits of its results can depend on it. So every call has the
-same shape: the last batch is padded with its own last element, and trimmed.
+XLA compiles for one shape, and the last bits of results can depend on the shape. So every call has the same shape: the
+last batch is padded with its own last element, and its results are trimmed.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,25 +16,25 @@ from jax import lax
 from cspr_jax.numerics.cores import cores
 from cspr_jax.numerics.elementary import double_precision
 
-# How many times as large a batch is as on a CPU, whose caches it has to fit.
+# Factors by which batches are larger on other devices than on a CPU, whose caches they have to fit.
 LARGER = {"gpu": 16, "tpu": 16}
-# Largest length of a batch. Tests, which compute few cases at a time, set it lower.
+# Largest length of a batch; tests, which compute few cases at a time, lower it.
 LARGEST = 1 << 20
-# Cases are divided among so many threads, whatever the number of cores, so that results keep their bits.
+# Number of threads that share the cases; it does not depend on the number of cores, so that results keep their bits.
 THREADS = 2
 Found = TypeVar("Found")
 
 
 def in_threads(function: Callable, items: Sequence) -> list:
-    """Results of a function, in order, by two threads: work that XLA does on one core runs beside that of the other.
+    """Results of a function for each item, in order, computed by two threads, since XLA often uses one core only.
 
     In a process that computes on one core, one thread does it all.
     """
-    # jax does not say its type.
+    # jax does not declare the type of this setting.
     device = jax.config.jax_default_device  # type: ignore[attr-defined]
 
     def one(item):
-        # Settings of jax may belong to the caller's thread alone.
+        # The caller's settings of jax may hold in its own thread alone.
         with double_precision(), jax.default_device(device):
             return function(item)
 
@@ -45,11 +45,8 @@ def in_threads(function: Callable, items: Sequence) -> list:
 
 
 def in_parts(function: Callable[[slice], Found], count: int, length: int) -> list[Found]:
-    """Results of many cases, range by range.
-
-    Two threads work: what one does outside of XLA, and what XLA does on one core, runs beside the work of the other.
-    """
-    # All parts have one length, and each thread gets as many.
+    """Results of many cases, range by range, computed by two threads; see `in_threads`."""
+    # All parts have the same length up to one case, and each thread gets the same number of parts.
     rounds = -(-count // (THREADS * length))
     bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
     return in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
@@ -71,7 +68,7 @@ def row_by_row(function: Callable, rows):
 def in_batches(function: Callable, arguments, *, batch_size: int, axis: int = 0):
     """Apply a compiled function to arrays of any length, in batches of one length."""
     batch_size = device_batch_size(batch_size)
-    arguments = jax.tree.map(np.asarray, arguments)  # to slice an array of jax takes a hundred times as long
+    arguments = jax.tree.map(np.asarray, arguments)  # slicing arrays of jax takes a hundred times as long
     count = len(jax.tree.leaves(arguments)[0])
     if count == 0:
         return None

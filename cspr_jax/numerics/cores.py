@@ -1,4 +1,4 @@
-"""Cores that a process computes on: all that it may use, or a part where several processes work at once."""
+"""Number of cores that a process computes on: all available ones, or fewer where several processes work at once."""
 
 import math
 import os
@@ -31,8 +31,8 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
         controllers, _, group = rest.partition(":")
         if controllers and "cpu" not in controllers.split(","):
             continue
-        # In a container the path may be that of the machine, of which only the end, or nothing, exists in the folder.
-        # Version 1 has a folder for its controllers; where both versions are in use, version 2 has one, too.
+        # In a container the path may be the host's, of which only the last parts, or none, exist below the mounted folder.
+        # Version 1 has a folder for its controllers; where both versions are in use, version 2 has a folder of its own.
         for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
             path = PurePosixPath(group.lstrip("/"))
             for level in (path, *path.parents):
@@ -45,7 +45,7 @@ def _granted(folder: Path) -> float:
         try:
             words = " ".join((folder / name).read_text("ascii") for name in names).split()
             time, period = float(words[0]), float(words[1])
-        except (OSError, ValueError, IndexError):  # not there, or "max"
+        except (OSError, ValueError, IndexError):  # the file is missing, or says "max"
             continue
         if time > 0.0 and period > 0.0:
             return time / period

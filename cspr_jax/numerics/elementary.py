@@ -18,7 +18,7 @@ from cspr_jax.numerics.shapes import Float
 # Numbers of terms that keep the truncation error below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
 _COSINE_TERMS = {"float64": 12, "float32": 7}
-# Promotion of dtypes and of ranks, as jax names it, whatever the caller has set. Tests set the strictest.
+# jax's settings for promotion of dtypes and of ranks, which replace the caller's; tests use the strictest.
 PROMOTION = ("standard", "allow")
 
 
@@ -40,8 +40,8 @@ def unit_vectors(vectors: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... 
 def sincospi(x: Float[Array, "..."]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """sin(pi x) and cos(pi x), by range reduction and a polynomial.
 
-    The sine and cosine of XLA's CPU backend run one element at a time; this runs in vector
-    registers. Counting the angle in half turns makes the reduction exact.
+    The sine and cosine of XLA's CPU backend compute one element at a time; this uses vector registers. With angles in
+    half turns the range reduction is exact.
     """
     half_turns = jnp.round(x)
     angle = x - half_turns
@@ -61,16 +61,16 @@ def nan_ignoring_min(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Ar
 def length(vector: Float[Array, "n"]) -> Float[Array, ""]:
     """Length of a vector, with a gradient of zero where it is zero."""
     square = jnp.sum(vector * vector)
-    # The length is NaN where the square is.
+    # A square that is NaN fails both comparisons, so that the length is NaN too.
     return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
 
 
-# The process that has started jax for this package.
+# Id of the process in which this package first used jax; empty before.
 _users: list[int] = []
 
 
 def _refuse_fork() -> None:
-    # A computation of jax in a forked process would wait for ever.
+    # Refuse computations in forked processes, where jax would wait for ever.
     if not _users:
         _users.append(os.getpid())
     if _users[0] != os.getpid():
@@ -84,7 +84,7 @@ def _refuse_fork() -> None:
 def double_precision() -> Iterator[None]:
     """Set jax as this package needs it, whatever the caller has set, and restore the caller's settings afterwards.
 
-    Above all 64 bits, since verdicts are in float64. NaN is a valid answer in places, so that it is no error.
+    The most important setting is 64 bits, since verdicts are in float64. NaN is a valid result in places, not an error.
     """
     _refuse_fork()
     with contextlib.ExitStack() as stack:
@@ -133,7 +133,7 @@ def solved(matrix: Float[Array, "n n"], right: Float[Array, "n m"]) -> tuple[Flo
         is_pivot, is_next = index == pivot_index, index == k
         pivot_row = jnp.sum(jnp.where(is_pivot[:, None], rows, 0.0), axis=0)
         pivot = jnp.sum(jnp.where(is_pivot, column, 0.0))
-        # Swap the two rows.
+        # Swap the current row and the row of the pivot.
         rows, column = jnp.where(is_pivot[:, None], row, rows), jnp.where(is_pivot, column[k], column)
         determinant = determinant * pivot * jnp.where(pivot_index == k, 1.0, -1.0)
         pivot_row = pivot_row / pivot

@@ -40,7 +40,7 @@ def derivatives(table: Float[np.ndarray, "... n"], order: int) -> list[np.ndarra
 def over(
     table: Float[np.ndarray, "... n"], start: Float[np.ndarray, "..."], width: Float[np.ndarray, "..."]
 ) -> Float[np.ndarray, "... n"]:
-    """Polynomials of another variable: 0 at the start of a block, 1 at its end."""
+    """Polynomials of another variable, which is 0 at the start of a block and 1 at its end."""
     degree = table.shape[-1] - 1
     moved = np.zeros(np.broadcast_shapes(table.shape, (*np.shape(start), 1)))
     for i in range(degree + 1):

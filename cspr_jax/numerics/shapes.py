@@ -1,4 +1,4 @@
-"""Types of arrays with their shapes, `Float[Array, "n 3"]`, for readers and type checkers: nothing evaluates them."""
+"""Types of arrays with shapes, `Float[Array, "n 3"]`, for readers and type checkers, not checked at run time."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,7 @@
 """Models of CASPR: NAME_bodies.xml and NAME_cables.xml, metres, newtons, z up.
 
 Points are in the frame of their link. A link's mass centre lies at com_location from its joint; points of cables whose
-attachment_reference is "com" count from there. Off-diagonals of an inertia tensor are its entries, not minus them.
+attachment_reference is "com" are relative to it. Off-diagonal entries of an inertia tensor keep their sign.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _JOINTS = {
 }
 _ENDINGS = ("_bodies.xml", "_cables.xml")
 _RIGID = "cable_ideal"
-_CABLES = "cable_"  # all kinds begin so
+_CABLES = "cable_"  # prefix of the tags of all kinds of cables
 _PULLEY = "base_rotating_pulley"
 
 
@@ -133,7 +133,7 @@ def joint_position(file: Path) -> tuple[str, Float[np.ndarray, "3 3"], Float[np.
 
 
 def _joint_position(file: Path, joint: _Joint) -> list[float]:
-    # Base points count from a joint that does not move; of planar robots the plane is that of the joint.
+    # Base points are relative to a joint that does not move; planar robots move in the plane of the joint.
     parent = child(_link(file), "parent", file)
     if text_of(child(parent, "num", file)) != "0":
         raise ConfigError(file, "parent.num: must be 0, the base")

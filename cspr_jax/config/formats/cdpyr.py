@@ -1,7 +1,7 @@
 """Robots of cdpyr: JSON or YAML, metres, kilogrammes, newtons, z up; in a plane x and y, with y up; on a line x.
 
-Chains say which frame anchor goes to which platform anchor; numbers count from 0. Inertia is about the origin of the
-platform. A pulley swivels about the z axis of its anchor, and the cable enters along it.
+Chains say which frame anchor is joined to which platform anchor; both are numbered from 0. Inertia is about the origin
+of the platform. A pulley swivels about the z axis of its anchor, along which the cable enters.
 """
 
 import json
@@ -19,11 +19,11 @@ from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import look_alike
 
-# By numbers of rotations and translations.
+# Patterns by their numbers of rotations and translations.
 PATTERNS = {(0, 1): "1T", (0, 2): "2T", (0, 3): "3T", (1, 2): "1R2T", (2, 3): "2R3T", (3, 3): "3R3T"}
 AXES = {"1T": model.OF_X, "2T": model.OF_XY, "1R2T": model.OF_XY}
 MAX_CABLES = 1000
-LARGEST = 1_000_000  # values of a file
+LARGEST = 1_000_000  # largest number of values of a file
 
 
 def read_json(path: Path) -> Body:
@@ -50,7 +50,7 @@ def _yaml(text: str) -> Any:
 
     try:
         data = load(text)
-    # Its constructors of numbers and dates raise arbitrary errors, as of "!!int ''" and "!!timestamp x".
+    # YAML's constructors of numbers and dates raise arbitrary errors, such as for "!!int ''" and "!!timestamp x".
     except (yaml.YAMLError, LookupError, AttributeError, ArithmeticError, TypeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
     if not _value_count(data, {}) <= LARGEST:
@@ -59,7 +59,7 @@ def _yaml(text: str) -> Any:
 
 
 def _value_count(data: Any, counts: dict[int, float]) -> float:
-    # Number of values with references written out; infinite where one holds itself.
+    # Number of values once references are written out; infinite where a value contains itself.
     if not isinstance(data, dict | list):
         return 1.0
     if id(data) not in counts:
@@ -83,7 +83,7 @@ def _read(path: Path, parse: Callable[[str], Any], kind: str) -> Body:
 
 
 class _Table:
-    """Part of the file, by its keys."""
+    """Part of the file whose values are read by their keys."""
 
     def __init__(self, data: Any, label: str, file: Path) -> None:
         if not isinstance(data, dict):
@@ -103,7 +103,7 @@ class _Table:
         return [_Table(one, f"{self.prefix}{key}[{k}]", self.file) for k, one in enumerate(tables)]
 
     def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:
-        """Finite numbers of a shape; None where the key is absent, and infinite ones stand for none."""
+        """Finite numbers of a shape; None where one is infinite; `missing` where the key is absent."""
         if not self.has(key):
             return None if missing is None else np.asarray(missing, float)
         try:

@@ -1,4 +1,4 @@
-"""Model that all formats are read into, one body on cables, and the keys of a robot file that it becomes."""
+"""Model that all formats are read into, one body on cables, and its conversion to the content of a robot file."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.spool_plane import SMALLEST_AREA_RATIO
 
-# Rows: x, y and z of a robot file in the axes of another, for each plane, or line, of motion there.
+# Rows are x, y and z of a robot file in the axes of the other file, by the plane or line of motion in that file.
 SAME = np.eye(3)
 OF_XY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 OF_YZ = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 OF_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-NO_GRAVITY = 1e-9  # m/s^2; of robots that move in a level plane
-# Fraction of the size by which points of a planar robot may miss its plane.
+NO_GRAVITY = 1e-9  # m/s^2; gravity of robots that move in a level plane
+# Largest distance of the points of a planar robot from its plane, as a fraction of the robot's extent.
 OUT_OF_PLANE = 1e-9
 LARGEST = 1e9  # N; larger tensions stand for no limit
-DIGITS = 15  # digits of numbers that are sums
-LARGEST_NUMBER = 1e18  # of a file, whatever its unit: products of several still stay finite
+DIGITS = 15  # significant digits that sums are written with
+LARGEST_NUMBER = 1e18  # in a file, in any unit, so that products of several numbers stay finite
 
 
 @dataclasses.dataclass
@@ -31,13 +31,13 @@ class Cable:
     """A cable.
 
     Fields:
-        base: (3,) where it leaves its spool, or enters its pulley, m.
-        platform: (3,) where it is attached, from the origin of the platform frame, m.
-        name: in the file; empty: none.
+        base: (3,) point where it leaves its spool, or enters its pulley, m.
+        platform: (3,) attachment point, from the origin of the platform frame, m.
+        name: name in the file; empty: none.
         tension_min: N.
         tension_max: N; infinite: none.
-        radius: of its pulley, m; 0: none.
-        axis: (3,) about which the pulley swivels, in the direction in which the cable enters.
+        radius: radius of its pulley, m; 0: none.
+        axis: (3,) swivel axis of the pulley, in the direction in which the cable enters.
     """
 
     base: list[float]
@@ -54,19 +54,19 @@ class Body:
     """A robot of one body, z up, in the axes of its file.
 
     Fields:
-        file: that it was read from, named in errors.
-        name: of the robot.
-        pattern: of its motion, a row of `robots.model.patterns`.
-        cables: in their order.
+        file: file that it was read from, named in errors.
+        name: name of the robot.
+        pattern: pattern of its motion, a row of `robots.model.patterns`.
+        cables: cables in the order of the file.
         source: where the numbers come from.
         mass: kg; None: missing.
         centre: (3,) mass centre from the origin of the platform frame, m.
-        inertia: (3, 3) about it, platform axes, kg m^2; None: missing.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: missing.
         axes: (3, 3) rows x, y and z of a robot file in these axes.
         is_level: whether its plane is level, so that it feels no gravity.
         cable_diameter: m.
         warnings: items that were left out.
-        notes: placeholders for numbers that the file does not have, in words that begin with "placeholder".
+        notes: sentences that begin with "placeholder", about numbers that the file does not have.
     """
 
     file: object
@@ -91,7 +91,7 @@ def about_centre(tensor: Float[np.ndarray, "3 3"], mass: float, centre: list[flo
 
 
 def robot_spec(body: Body) -> dict[str, Any]:
-    """Keys of the robot file that a body becomes."""
+    """Content of the robot file that a body becomes."""
     if not body.cables:
         raise ConfigError(body.file, "no cables: must be one or more")
     base = np.array([cable.base for cable in body.cables]) @ body.axes.T
@@ -103,7 +103,7 @@ def robot_spec(body: Body) -> dict[str, Any]:
         _check_plane(body, base, platform)
         base[:, 1] = platform[:, 1] = 0.0
         swivels = _in_plane(body, swivels)
-    if not row.is_body:  # it does not turn: forces alone count
+    if not row.is_body:  # a point mass does not turn: only forces matter
         base, platform = base - platform, np.zeros_like(platform)
     notes = list(body.notes)
     spec: dict[str, Any] = {"name": body.name, "pattern": pattern, "z_axis": "up", "base_points": _rounded(base)}
@@ -117,13 +117,13 @@ def robot_spec(body: Body) -> dict[str, Any]:
     if body.is_level:
         spec["gravity"] = NO_GRAVITY
     spec |= _of_cables(body, swivels)
-    # A source that begins so is shown as a placeholder.
+    # Sources that begin with a note are shown as placeholders.
     spec["source"] = "; ".join([*notes, body.source])
     return spec
 
 
 def _own_pattern(body: Body, platform: np.ndarray) -> str:
-    # Cables that are attached on one line, or at one point, with the mass centre, leave a body in space free to turn.
+    # A spatial body is free to turn if attachment points and mass centre lie on one line, or at one point.
     if body.pattern != "3R3T":
         return body.pattern
     offsets = platform - body.axes @ np.asarray(body.centre)

@@ -1,4 +1,4 @@
-"""Table of formats: one row each. A new format is a file beside this one, and a row."""
+"""Table of formats of other programs. A new format is a file in this folder and a row of this table."""
 
 import dataclasses
 import importlib
@@ -15,10 +15,10 @@ class Format:
     """Format of robot files of another program.
 
     Fields:
-        name: of the program.
-        endings: of its files' names.
+        name: name of the program.
+        endings: how names of its files end.
         description: for people.
-        reader: "module:function", called with the path, and with the name of a set of cables, or None, if `has_sets`.
+        reader: "module:function", called with the path and, if `has_sets`, with the name of a set of cables or None.
         has_sets: whether a file may hold several sets of cables.
     """
 
@@ -51,8 +51,8 @@ class Imported:
     """Robot that was read from a file of another program.
 
     Fields:
-        spec: content of its robot file.
-        cable_names: in the other file.
+        spec: content of the robot file that it becomes.
+        cable_names: names of the cables in the file of the other program.
         warnings: items that were left out, one line each.
     """
 
@@ -62,7 +62,7 @@ class Imported:
 
 
 def format_of(name: str) -> Format | None:
-    """The format of a file."""
+    """The format of a file, by the ending of its name."""
     return next((row for row in FORMATS if name.lower().endswith(row.endings)), None)
 
 

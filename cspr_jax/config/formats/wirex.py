@@ -1,9 +1,9 @@
-"""Robots of WireX: XML named .wcrfx, metres, kilogrammes, z up; numbers of platforms and cables count from 1.
+"""Robots of WireX: XML named .wcrfx, metres, kilogrammes, z up; platforms and cables are numbered from 1.
 
-A pulley swivels about the z axis of its base point, and the cable enters along it. Inertia is about the mass centre.
+A pulley swivels about the z axis of its base point, along which the cable enters. Inertia is about the mass centre.
 
-Its library reads neither mass nor mass centre nor inertia, but writes them: robots that nobody weighed have its default
-values, which are taken for placeholders.
+The library of WireX writes mass, mass centre and inertia but never reads them: robots that nobody weighed have its
+default values, which are treated as placeholders.
 """
 
 import math
@@ -21,8 +21,8 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.robots.model.patterns import PATTERNS
 
 VERSIONS = ("0.31", "0.32")
-_MASS, _CENTRE = 25.0, [0.0, 1.0, 0.2]  # kg, m
-# Version 0.31 writes one number instead of the tensor, 0.32 the tensor.
+_MASS, _CENTRE = 25.0, [0.0, 1.0, 0.2]  # default values, kg and m
+# Default tensors: version 0.31 writes one number instead of the tensor, 0.32 the tensor.
 _TENSORS = (np.diag([14.0, 0.0, 0.0]), np.diag([2.0, 3.0, 4.0]))  # kg m^2
 
 
@@ -91,7 +91,7 @@ def _replace_defaults(body: Body) -> None:
     is_body, defaults = PATTERNS[body.pattern].is_body, []
     is_tensor = body.inertia is not None and any(np.array_equal(body.inertia, tensor) for tensor in _TENSORS)
     is_centre = body.centre == _CENTRE
-    # A robot of 25 kg may have been weighed; nobody measures these tensors or that mass centre.
+    # A robot may really weigh 25 kg, but hardly have such a tensor or mass centre too.
     if body.mass == _MASS and (is_centre or is_tensor):
         defaults.append(f"the mass of {_MASS:g} kg")
         body.notes.append(f"placeholder mass of {_MASS:g} kg")
@@ -107,7 +107,7 @@ def _replace_defaults(body: Body) -> None:
 
 
 def _limit(root: Element, body: Body, file: Path) -> None:
-    # The limits allow every application of the file. Zero stands for a largest load that is not known.
+    # The limits allow every application of the file; a largest load of zero means that it is not known.
     applications = list(root.iter("application"))
     cables = [(one, "minimum_load", "cable") for one in root.findall("cable")]
     minimum = [

@@ -9,7 +9,7 @@ from cspr_jax.errors import printable
 
 
 def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
-    """Text of a robot file."""
+    """Text of a robot file, with the names of its cables in comments."""
     lines = []
     if any(cable_names):
         lines.append("# cables: " + ", ".join(printable(name) for name in cable_names))
@@ -17,7 +17,7 @@ def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Text of a value."""
+    """A value as TOML text."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {value_text(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list) and value and isinstance(value[0], list):

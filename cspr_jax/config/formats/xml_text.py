@@ -1,4 +1,4 @@
-"""XML of other programs: nothing is expanded or fetched; a missing element becomes one line."""
+"""XML of other programs: nothing is expanded or fetched; a missing element becomes an error of one line."""
 
 import codecs
 import math
@@ -41,13 +41,13 @@ def read_xml(path: Path) -> Element:
         raise ConfigError(path, f"is not XML: {error}"[:LONGEST_FAULT] + hint) from error
     except RecursionError as error:
         raise ConfigError(path, "is not XML that is read here: nested too deeply") from error
-    except (ValueError, LookupError) as error:  # of codecs
+    except (ValueError, LookupError) as error:  # raised by codecs
         allowed = "UTF-8, UTF-16, or one with a byte for each character, such as ISO-8859-1"
         raise ConfigError(path, f"encoding = {shown(name)}: must be {allowed}") from error
 
 
 def _encoding(data: bytes) -> tuple[str | None, str]:
-    # The first bytes outweigh the declaration; None: the parser is to take the name that is declared.
+    # Encoding by the first bytes, which take precedence over the declaration; None: the parser reads the declaration.
     if data[:2] in _UTF16:
         return _UTF16[data[:2]], ""
     declared = _DECLARED.match(data)
@@ -57,7 +57,7 @@ def _encoding(data: bytes) -> tuple[str | None, str]:
 
 
 def child(parent: Element, tag: str, file: object, label: str = "") -> Element:
-    """The one element of a kind below another."""
+    """The only child element of a tag."""
     elements = parent.findall(tag)
     if len(elements) != 1:
         raise ConfigError(file, f"{label or parent.tag}: {len(elements)} elements <{tag}>: must be one")

@@ -5,16 +5,16 @@ from typing import Any
 import yaml
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-# Robots have at most 1000 cables; Python's own loader takes some 100 us for an event, libyaml's some 5 us.
+# Enough for 1000 cables; Python's own loader takes some 100 us for an event, libyaml's some 5 us.
 MAX_EVENTS = 300_000 if hasattr(yaml, "CSafeLoader") else 20_000
 DEEPEST = 100
-LONGEST_SCALAR = 10_000  # characters: base 60 makes integers of them in a time that grows with the square
-MAX_ODD_KEYS = 1000  # that are no words: numbers can be chosen so that all collide in a table
+LONGEST_SCALAR = 10_000  # characters; the time to read integers of base 60 grows with the square of their length
+MAX_ODD_KEYS = 1000  # largest number of keys that are not strings: numbers can be chosen so that their hashes collide
 _WORD = "tag:yaml.org,2002:str"
 
 
 class _Loader(_Base):
-    """Safe loader that counts the pairs that merge keys (<<) multiply."""
+    """Safe loader that limits the pairs that merge keys (<<) copy."""
 
     pairs = 0
 

@@ -1,4 +1,4 @@
-"""G-code: straight moves and arcs of a file, in SI units. Words that lead elsewhere are refused with their line."""
+"""G-code: straight moves and arcs of a file, in SI units. Words that change the path otherwise are refused."""
 
 import math
 import re
@@ -16,7 +16,7 @@ from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 
 _UNITS = {20: 0.0254, 21: 0.001}
 _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)
-# Normal of each plane, and its letters in the order in which they turn.
+# Of each plane: index of the normal axis, and the letters of positions and of centres in the order of positive turns.
 _PLANES = {17: (2, "XY", "IJ"), 18: (1, "ZX", "KI"), 19: (0, "YZ", "JK")}
 MINUTE = 60.0  # s
 # Largest number of words that a message names, and of decimals that count.
@@ -27,15 +27,15 @@ class Move(NamedTuple):
     """Move along a line, an arc or a helix, in the axes of the file.
 
     Fields:
-        line: number in the file.
+        line: number of its line in the file.
         start: [x, y, z], m.
         end: [x, y, z], m.
         centre: of an arc in its plane, [x, y], of G18 [z, x], of G19 [y, z], m; of a line None.
         angle: by which an arc turns about its normal, by the rule of the right hand, rad.
         speed: largest speed, m/s; inf without one.
-        feed: the same as the file has it, such as "F600"; "" without one.
-        normal: number of the axis about which an arc turns.
-        ends_at_rest: whether the program pauses behind it.
+        feed: speed as the file has it, such as "F600"; "" without one.
+        normal: index of the axis about which an arc turns.
+        ends_at_rest: whether the program pauses after it.
     """
 
     line: int
@@ -53,7 +53,7 @@ class GcodeProgram(NamedTuple):
     """Moves of a program.
 
     Fields:
-        moves: those that go somewhere, from where x, y and z are known.
+        moves: moves that change the position, from the point on where x, y and z are all known.
         notes: what its user should know, in lines.
     """
 
@@ -62,7 +62,7 @@ class GcodeProgram(NamedTuple):
 
 
 def read_program(path: Path, start: list[float] | None = None) -> GcodeProgram:
-    """Moves of a file of G-code. Lengths are in mm until it says otherwise, coordinates absolute."""
+    """Moves of a file of G-code; until it says otherwise, lengths are in mm and coordinates absolute."""
     text = read_text(path)
     reader = _GcodeReader(path, start, _decimals(text))
     for number, line in enumerate(text.split("\n"), start=1):
@@ -74,14 +74,14 @@ def read_program(path: Path, start: list[float] | None = None) -> GcodeProgram:
 
 
 def _decimals(text: str) -> int:
-    # Trailing zeros may be left out: all lengths have as many decimals as the one with most.
+    # Files may leave out trailing zeros: all lengths are as precise as the one with most decimals.
     return min(max(map(len, _DECIMALS.findall(text)), default=0), MAX_DECIMALS)
 
 
 class _GcodeReader:
     def __init__(self, path: Path, start: list[float] | None, decimals: int) -> None:
         self.path, self.moves, self.line = path, list[Move](), 0
-        # Coordinates as written, and the position at which the last move ends: arcs may miss the first ones.
+        # `position` is as written, `end` where the last move ends: arcs may end beside the written position.
         self.position: list[float | None] = [None] * 3 if start is None else [*start]
         self.end, self.shift, self.half_unit = start, [0.0] * 3, 0.5 * 0.1**decimals
         self.modes = {"motion": -1.0, "plane": 17.0, "units": 21.0, "distances": 90.0, "centres": 91.1}
@@ -94,7 +94,7 @@ class _GcodeReader:
         return _UNITS[int(self.modes["units"])]
 
     def is_over(self, text: str) -> bool:
-        # Take in a line; tell whether the program ends there.
+        # Read a line; tell whether the program ends there.
         if text.strip() == "%":
             return bool(self.moves)
         try:
@@ -139,7 +139,7 @@ class _GcodeReader:
         return lines
 
     def _follow(self, line: GcodeLine) -> None:
-        # Do what a line says, in the order of controllers: feed, units, pauses, then moves.
+        # Apply a line in the order in which controllers do: feed, units, pauses, then moves.
         codes = [code.value for code in line.codes]
         self.modes |= {SETTINGS[code]: code for code in codes if code in SETTINGS}
         self._set_feed(line)
@@ -189,7 +189,7 @@ class _GcodeReader:
         return lengths
 
     def _shift(self, axes: dict[str, Word]) -> None:
-        # From here on the current position has these coordinates in the file (G92); unknown ones become known.
+        # G92 gives the current position these coordinates from here on, also where it was unknown.
         for letter, length in self._lengths(axes).items():
             i = "XYZ".find(letter)
             if i >= 0:
@@ -199,7 +199,7 @@ class _GcodeReader:
         self._begin()
 
     def _go_home(self, name: str, axes: dict[str, Word]) -> None:
-        # Only the machine knows where that is: the path begins behind, or ends before.
+        # Only the machine knows the home position: the path begins after the first such move, or ends before it.
         self.skipped[name] += 1
         if self.moves:
             self.away = self.away or f"line {self.line}, {name}"
@@ -256,7 +256,7 @@ class _GcodeReader:
             self.position[i] = length - self.shift[i]
 
     def _begin(self) -> None:
-        # The path begins where all coordinates are known.
+        # The path begins at the first position whose coordinates are all known.
         if self.end is None and None not in self.position:
             self.end, self.first = [float(x or 0.0) for x in self.position], self.line
 

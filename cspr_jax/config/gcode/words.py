@@ -1,4 +1,4 @@
-"""Words of G-code by what they do to a path, as LinuxCNC, Grbl and Marlin take them."""
+"""Words of G-code by their effect on a path, as LinuxCNC, Grbl and Marlin read them."""
 
 import re
 from typing import NamedTuple
@@ -10,19 +10,19 @@ _COMMENT = re.compile(r"\([^()]*\)|;.*")
 # Checksum of a line that a host sends to a printer; a number with an exponent.
 _CHECKSUM = re.compile(r"\*\s*\d+\s*$")
 _EXPONENT = re.compile(r"e[+-]?\d|E[+-]\d\d")
-# Numbers of G words by what they set; one of each may stand in a line.
+# Numbers of G words, with what they set; a line may set each of these once.
 SETTINGS = {0.0: "motion", 1.0: "motion", 2.0: "motion", 3.0: "motion", 17.0: "plane", 18.0: "plane", 19.0: "plane"}
 SETTINGS |= {20.0: "units", 21.0: "units", 90.0: "distances", 91.0: "distances", 90.1: "centres", 91.1: "centres"}
-# Systems of coordinates; their offsets are those of a machine.
+# G words of coordinate systems, whose offsets only the machine knows.
 SYSTEMS = {float(code) for code in range(54, 60)} | {59.1, 59.2, 59.3}
-# They lead to positions that the machine knows, and the file does not.
+# G words that move to positions that the machine knows, and the file does not.
 HOME = {28.0: "G28", 29.0: "G29", 30.0: "G30", 53.0: "G53"}
 DWELL, SHIFT, END_SHIFT = 4.0, 92.0, (92.1, 92.2)
-# Compensations and modes that are off, tool lengths, path modes, and how canned cycles return.
+# G words without effect on a path: compensations and modes off, tool lengths, path modes, returns of canned cycles.
 _SKIPPED = {8.0, 9.0, 10.0, 11.0, 15.0, 28.1, 30.1, 40.0, 43.0, 43.1, 43.4, 49.0, 50.0, 61.0, 61.1, 64.0, 69.0, 80.0}
 _SKIPPED |= {94.0, 96.0, 97.0, 98.0, 99.0}
 _CURVE, _CYCLE = "must be written as G1, G2 and G3", "must be written as the G0 and G1 that it stands for"
-# Others that lead a path elsewhere, with what to write instead.
+# Other G words that change a path, with what to write instead.
 _REFUSED = {5.0: _CURVE, 5.1: _CURVE, 5.2: _CURVE, 5.3: _CURVE}
 _REFUSED |= dict.fromkeys((33.0, 33.1, 38.2, 38.3, 38.4, 38.5, 73.0, 74.0, 76.0), _CYCLE)
 _REFUSED |= dict.fromkeys((float(code) for code in range(81, 90)), _CYCLE)
@@ -35,14 +35,14 @@ READ = (
 )
 ENDS, PAUSES = (2.0, 30.0), (0.0, 1.0, 6.0, 60.0)
 OVERRIDE = 220.0
-# M words of the standard of NIST, with which axes may move in one line. Others have parameters of their own, or a text.
+# M words of NIST's standard: axes may move in the same line. Other M words take parameters of their own, or a text.
 _STANDARD = {float(code) for code in (*range(12), 30, *range(48, 54), *range(60, 74))}
 _ELSEWHERE = {47.0, 97.0, 98.0, 99.0, 206.0, 428.0}
-# Letters that change no path: of extruders, spindles and tools.
+# Letters of extruders, spindles and tools, which change no path.
 _LETTERS = "DEHLPQST"
 _TURNS = "ABCUVW"
 LENGTHS = "XYZIJKR"
-# Digits that a message shows of a number.
+# Largest number of digits of a number that a message shows.
 _DIGITS = 24
 
 
@@ -51,7 +51,7 @@ class Word(NamedTuple):
 
     Fields:
         letter: a capital.
-        value: of the number; None: there is none.
+        value: the number; None: there is none.
         text: both, as a message shows them.
     """
 
@@ -77,7 +77,7 @@ class GcodeLine(NamedTuple):
 
 
 class WordError(ValueError):
-    """A word that is not read; its text, and what is allowed."""
+    """A word that is not read; arguments are its text and what is allowed."""
 
 
 def line_of(text: str) -> GcodeLine:
@@ -111,7 +111,7 @@ def _word(match: re.Match[str]) -> Word:
 
 
 def _take(line: GcodeLine, word: Word, rest: str) -> bool:
-    # Take in a word; tell whether what follows in the line belongs to it.
+    # Read a word; tell whether the rest of the line belongs to it.
     letter, value, name = word
     is_home = any(code.value in (28.0, 29.0, 30.0) for code in line.codes)
     if value is None and (letter in "GMNF" or not (is_home or letter in "DEHLPQSTW")):

@@ -37,7 +37,7 @@ Frequency = Annotated[
 
 
 class OscillationTable(Table):
-    """Oscillation of a platform about its orientation, once a turn."""
+    """Oscillation of a platform about its orientation, one period for each turn of the ellipse."""
 
     axis: Point = Field(description="direction [x, y, z] of the axis, fixed axes")
     angle: Angle = Field(description="largest angle, rad")
@@ -142,7 +142,7 @@ def cell_axes(
     level = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=-1)
 
     def rotated(axis: np.ndarray) -> np.ndarray:
-        # About the level direction.
+        # Rotate about the level direction.
         along = level * (level @ axis)[..., None]
         return scale * (along + np.cos(tilt) * (axis - along) + np.sin(tilt) * np.cross(level, axis))
 

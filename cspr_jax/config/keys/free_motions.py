@@ -9,7 +9,7 @@ from cspr_jax.config.reading import Table
 
 
 class FreeMotionKeys(Table):
-    """Keys that only free motions take."""
+    """Keys that only plans of free motions have."""
 
     objective: Literal["time", "energy", "tension", "margin"] | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""The [launch] tables: of a plan, where an object is released on its way, and of maps of such launches."""
+"""The [launch] tables of plans, which release an object along a segment, and of maps of such launches."""
 
 from typing import Annotated, Literal
 
@@ -13,7 +13,7 @@ Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 
 
 class ErrorTable(Table):
-    """Errors of a launch, whose scatter is computed."""
+    """Errors of a launch, from which the scatter of landing points is computed."""
 
     release: ErrorMagnitude = Field(0.0, description="standard deviation of the time of release, s")
     cable_length: ErrorMagnitude = Field(
@@ -76,7 +76,7 @@ _ASIDE = "from twice the robot's size on one side of the centroid of the spools 
 
 
 class LaunchSearch(Table):
-    """Bounds within which maps of launches look for a release."""
+    """Bounds within which maps of launches search for a release."""
 
     release_x: Interval | None = Field(None, description=_OF_RELEASES.format("x", _ASIDE))
     release_y: Interval | None = Field(None, description=_OF_RELEASES.format("y", _ASIDE))

@@ -20,8 +20,8 @@ from cspr_jax.config.wording import table_error
 from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
-# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.model.point_mass`,
-# with jax.
+# Squares and cubes of larger numbers could overflow; no robot is near them. `robots.model.point_mass`, which needs jax,
+# has the same bounds.
 LARGEST_LENGTH = 1e6
 MAX_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
@@ -80,7 +80,7 @@ def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) 
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
-# A function makes these types; they are Any to mypy, which does not check them.
+# A function makes these types, which mypy cannot check: they are Any.
 PerCable: Any = _one_or_each(Positive, Positive)
 NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
 TensionPerCable: Any = _one_or_each(Positive, Bound)
@@ -99,7 +99,7 @@ def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
     return fields
 
 
-# Their fields are rows of `schema.limits.LIMITS`; mypy asks nothing of a base that it does not know.
+# A base class whose fields are the rows of `schema.limits.LIMITS`; Any, since mypy does not know it.
 _Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
 
 

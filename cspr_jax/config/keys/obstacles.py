@@ -26,7 +26,7 @@ HullOf = Annotated[
     Discriminator(lambda value: "~points" if isinstance(value, list) else "~true"),
 ]
 
-# Keys of each kind: those that it needs, and those that it may have.
+# Required and optional keys of each kind of obstacle.
 _KEYS_OF_KIND: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "sphere": (("centre", "radius"), ()),
     "cylinder": (("start", "end", "radius"), ()),
@@ -97,7 +97,7 @@ Obstacles = Annotated[list[ObstacleTable], Field(max_length=MAX_OBSTACLES)]
 
 
 class PlatformShapeKeys(Table):
-    """The platform's own shape, which its cables must not meet."""
+    """Shape of the platform, which its cables must not touch."""
 
     platform_box: Corners | None = Field(
         None,
@@ -144,7 +144,7 @@ class PlatformShapeKeys(Table):
 
 
 class ObstacleKeys(PlatformShapeKeys):
-    """Bodies that a robot must not meet while it moves."""
+    """Bodies that a robot must not touch while it moves."""
 
     obstacle: Obstacles | None = Field(None, description="[[obstacle]], bodies fixed in space that nothing may meet")
 

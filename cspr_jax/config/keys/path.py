@@ -14,7 +14,7 @@ from cspr_jax.errors import shown
 from cspr_jax.errors.given_numbers import SMALLEST
 from cspr_jax.schema.limits import LARGEST_GRID
 
-# Keys of a shape, by the kinds that take them.
+# Keys of the shape of a path, with the kinds that take them.
 _ALL = ("line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode")
 _KINDS = {
     "points": ("line", "polyline", "cubic", "quintic"),
@@ -31,16 +31,16 @@ _KINDS = {
 }
 _NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
 GRID, RAMP_TIME = 500, 0.1
-# Positions nearer to each other are the same, m.
+# Positions closer together than this are the same, m.
 SAME_PLACE = 1e-9
-# Number of cells of a grid in maps, where many paths are asked.
+# Number of intervals of a path's grid in maps, which time many paths.
 MAP_GRID = 200
 MAX_POINTS = 100_000
 GridSize = Annotated[int, Field(ge=2, le=LARGEST_GRID)]
 
 
 class PathTable(Table):
-    """Path, along which a motion takes the least time."""
+    """Path that a motion follows in the least time."""
 
     kind: Literal["line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode"] = Field(
         "line",
@@ -117,12 +117,12 @@ class PathTable(Table):
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether the table has the path itself, and does not only say how poses are joined."""
+        """Tell whether the table defines the path itself, and not only how poses are joined."""
         return self.points is not None or self.kind in _NEEDED
 
     @property
     def has_end(self) -> bool:
-        """Tell whether the path itself decides where it ends: it needs no pose there."""
+        """Tell whether the table says where the path ends, so that no pose is needed there."""
         return self.kind in _NEEDED or bool(self.closed)
 
     @property
@@ -132,17 +132,17 @@ class PathTable(Table):
 
     @property
     def curve(self) -> str:
-        """Kind of the curve through points, of a file or not."""
+        """Kind of the curve through the points, whether they stand in the table or in a file."""
         return (self.interpolation or "polyline") if self.kind == "csv" else self.kind
 
     def beside(self, plan: "PathTable | None") -> "PathTable":
-        """Table of a pose, with what the plan says of all paths."""
+        """Table of a pose, completed by what the plan says about all paths."""
         common: dict[str, Any] = {} if plan is None else {name: getattr(plan, name) for name in ("grid", "ramp_time")}
         return self.model_copy(update={name: value for name, value in common.items() if getattr(self, name) is None})
 
 
 class TargetPath(Table):
-    """Path to each target of a map."""
+    """Path from the start to each target of a map."""
 
     lift: Positive | None = Field(
         None,
@@ -170,7 +170,7 @@ class TargetPath(Table):
         return self
 
     def between(self, start: Sequence[float], end: Sequence[float], z_axis: str) -> PathTable | None:
-        """Path from the start to a target, as plans have it."""
+        """Path from the start to a target, as a table of a plan."""
         options: dict[str, Any] = {
             "grid": MAP_GRID if self.grid is None else self.grid,
             "ramp_time": RAMP_TIME if self.ramp_time is None else self.ramp_time,

@@ -108,5 +108,5 @@ class TrajectoryKeys(Table):
 
     @property
     def takes_amplitude(self) -> bool:
-        """Tell whether a family in use has an amplitude function, and not a law of its own."""
+        """Tell whether a family in use takes an amplitude function, rather than a time law of its own."""
         return any(FAMILIES[name].takes_amplitude for name in self.families)

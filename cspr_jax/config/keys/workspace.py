@@ -1,4 +1,4 @@
-"""The [workspace] table of sweeps: what a pose must meet to belong to the workspace."""
+"""The [workspace] table of sweeps: conditions that a pose must meet to belong to the workspace."""
 
 import math
 from typing import Annotated, Literal

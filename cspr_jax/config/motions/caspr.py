@@ -2,9 +2,9 @@
 
 Formulas are those of CASPR (github.com/darwinlau/CASPR, src/Model/Bodies/Trajectory/JointTrajectory.m, src/Util/
 Mathematics/Geometry/Spline.m, and Trigonometry/Quaternion.m there). Between two points a joint coordinate is a line, a
-cubic, a quintic, or a line between two parabolas. The orientation of a joint that turns about a point is a rotation
-about a fixed axis from one point to the next, whose angle follows the same law from rest to rest; CASPR itself refuses
-rates of these. Here orientations are quintic pieces of quaternions, as many as needed to come within `TURN_ERROR`.
+cubic, a quintic, or a line between two parabolas. The orientation of a spherical joint turns about a fixed axis from
+one point to the next, by an angle that follows the same law from rest to rest; CASPR itself refuses rates of such
+joints. This module makes quintic pieces of quaternions, as many as needed to come within `TURN_ERROR`.
 """
 
 import dataclasses
@@ -22,13 +22,13 @@ from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.errors.suggestions import did_you_mean
 
 ENDING = "_trajectories.xml"
-TURN_ERROR = 1e-11  # of the components of quaternions
-MAX_PARTS = 1024  # of a piece
-MAX_PIECES = 100_000  # of a trajectory
-MAX_TURNS = 300  # of a coordinate
+TURN_ERROR = 1e-11  # largest error of the components of quaternions
+MAX_PARTS = 1024  # largest number of parts of a piece
+MAX_PIECES = 100_000  # largest number of pieces of a trajectory
+MAX_TURNS = 300  # largest number of turns of a coordinate
 LONGEST_LINE = 600  # letters
 _AVERAGE, _BLEND = "cubic_spline_average_velocity_trajectory", "parabolic_blend_trajectory"
-# Tags of the derivatives that each point of a kind has.
+# Tags of the derivatives that the points of each kind of trajectory have.
 _KINDS = {
     "linear_spline_trajectory": ("q",),
     "cubic_spline_trajectory": ("q", "q_dot"),
@@ -40,8 +40,8 @@ _KINDS = {
 
 @dataclasses.dataclass(frozen=True)
 class _Coordinates:
-    # Axes of the coordinates that move the joint, which come first, and of those that turn it; the order of several
-    # turns in the letters of scipy: capitals turn with the body.
+    # Axes of the coordinates that move the joint, which come first, then of those that turn it. The order of several
+    # turns is in the letters of scipy: capitals are axes of the body.
     moves: tuple[int, ...] = ()
     turns: tuple[int, ...] = ()
     order: str = ""
@@ -147,7 +147,7 @@ def _vector(point: Element, tag: str, count: int, path: Path, label: str) -> lis
 
 
 def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path: Path, label: str) -> np.ndarray:
-    # Rates at the points: at the first and the last as the file says, else the mean of those on both sides.
+    # Rates at the points: first and last from the file, the others as mean of the slopes on both sides.
     means = np.diff(values, axis=0) / np.diff(times)[:, None]
     ends = [
         _vector(points[k], "q_dot", values.shape[1], path, f"{label}, point {k % len(points) + 1}") for k in (0, -1)
@@ -179,7 +179,7 @@ def _curves(
 def _blends(
     element: Element, points: list[Element], times: np.ndarray, values: list[np.ndarray], path: Path, label: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # As `_curves`: a parabola, a line, and a parabola from rest to rest.
+    # Like `_curves`, for a parabola, a line, and a parabola from rest to rest.
     knots, law = [0.0], []
     for k, point in enumerate(points[1:]):
         key, holder = ("blend_time", point) if point.get("blend_time") else ("blend_time_default", element)
@@ -204,7 +204,7 @@ def _rotating_pieces(
     law: np.ndarray,
     values: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Knots, positions and quaternions, in as many parts as these need.
+    # Return knots, positions and quaternions, with pieces divided until quaternions are accurate.
     from scipy.spatial.transform import Rotation  # takes time
 
     if len(coordinates.turns) == 1:
@@ -237,15 +237,15 @@ def _rotating_pieces(
 
 
 def _pieces(half: np.ndarray, axis: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, float]:
-    # Quintic pieces (m, 6, 4) of the quaternions of half angles, Bernstein coefficients (m, degree + 1), about axes
-    # (m, 3), and their error half way.
+    # Quintic pieces (m, 6, 4) of the quaternions of rotations about axes (m, 3) by twice the angles `half`, given by
+    # Bernstein coefficients (m, degree + 1); and their errors in the middle.
     degree = half.shape[1] - 1
 
     def unit(angle: np.ndarray) -> np.ndarray:
         return np.concatenate([np.cos(angle)[:, None], np.sin(angle)[:, None] * axis], axis=1)
 
     ends = []
-    for c in (half, half[:, ::-1]):  # derivatives by the fraction of the piece, from either end
+    for c in (half, half[:, ::-1]):  # derivatives with respect to the fraction of the piece, at either end
         first = degree * (c[:, 1] - c[:, 0])
         second = degree * (degree - 1) * (c[:, min(2, degree)] - 2.0 * c[:, 1] + c[:, 0])
         value, across = unit(c[:, 0]), unit(c[:, 0] + math.pi / 2.0)
@@ -259,7 +259,7 @@ def _pieces(half: np.ndarray, axis: np.ndarray, width: np.ndarray) -> tuple[np.n
 
 
 def _split(coefficients: np.ndarray, parts: int) -> np.ndarray:
-    # Bernstein coefficients (m parts, degree + 1, n) of equal parts of pieces (m, degree + 1, n).
+    # Divide pieces (m, degree + 1, n) into equal parts: Bernstein coefficients (m parts, degree + 1, n).
     degree = coefficients.shape[1] - 1
     nodes = np.arange(degree + 1) / degree
 

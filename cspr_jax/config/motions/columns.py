@@ -1,7 +1,7 @@
 """Columns of a table of a motion: which quantity each holds, and in which unit.
 
-Units stand behind the names (`config.motions.heads`), in a row of their own, or in a line `# units: mm, deg, ms`.
-Further lines of this kind are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
+Units follow the names (`config.motions.heads`), or stand in a row of their own or in a line `# units: mm, deg, ms`.
+Other directives are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from cspr_jax.errors.suggestions import did_you_mean, nearest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.quantities import TRAJECTORY
 
-# Columns that this program writes beside the motion.
+# Columns that this program writes in addition to the motion.
 _BESIDE = re.compile(rf"(?:{'|'.join(sorted(TRAJECTORY.keys() - WRITTEN.keys() - {'t'}))})(?:_\w+)?|feasible")
-# Without a header, columns stand in the order of these.
+# Order of the columns of tables without a header, by their number.
 PLAIN = {
     3: ("t", "x", "z"),
     4: ("t", "x", "y", "z"),
@@ -52,12 +52,12 @@ _VALUES = {
     "z": Z_AXES,
 }
 DIRECTIVES = (*_VALUES, "units")
-MAX_LISTED = 24  # columns in a message
-MAX_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
+MAX_LISTED = 24  # largest number of columns that a message lists
+MAX_SUGGESTIONS = 5  # largest number of columns that are not read and still get a line of their own
 
 
 def plain_names(count: int, has_times: bool) -> tuple[str, ...]:
-    """Names of columns that nothing names."""
+    """Names of the columns of a table that has no header."""
     return (PLAIN if has_times else PLAIN_PATH).get(count, ())
 
 
@@ -67,12 +67,12 @@ class MotionColumns:
 
     Fields:
         names: one of `NAMES` for each column; empty for a column that is not read.
-        heads: of all columns, as the file has them.
+        heads: heads of all columns, as the file has them.
         factors: (columns,) from the units of the file to SI.
-        is_written: whether this program wrote the table; it writes two rows of the same time where legs meet.
+        is_written: whether this program wrote the table; then two rows have the same time where legs meet.
         notes: lines for the user.
-        is_named: whether anything names the columns.
-        has_time_unit: whether anything says the unit of times.
+        is_named: whether the file names its columns.
+        has_time_unit: whether the file says the unit of its times.
     """
 
     names: tuple[str, ...]
@@ -85,7 +85,7 @@ class MotionColumns:
 
     @property
     def written_point(self) -> str | None:
-        """Point whose positions a table of this program has: the origin where those of the mass centre stand beside."""
+        """Point whose positions a table of this program has: the origin if columns of the mass centre follow."""
         return None if not self.is_written else "origin" if "mass_centre_x" in self.heads else "mass-centre"
 
     def has(self, group: str) -> bool:
@@ -93,7 +93,7 @@ class MotionColumns:
         return any(name in self.names for name in GROUPS[group][0])
 
     def values(self, group: str, rows: Float[np.ndarray, "n columns"]) -> np.ndarray | None:
-        """Values of a group of columns."""
+        """Values of a group of columns, in SI units."""
         if not self.has(group):
             return None
         values = np.zeros((len(rows), len(GROUPS[group][0])))
@@ -131,7 +131,7 @@ def columns(
     own_units: dict[int, str] | None = None,
     notes: Iterable[str] = (),
 ) -> MotionColumns:
-    """Columns of a table."""
+    """Find out which columns a table has, from its heads, units and directives."""
     common, plain = _common(units, path), PLAIN if has_times else PLAIN_PATH
     if heads is None and count not in plain:
         counts, words = ", ".join(map(str, plain)), "t, x, y, z, ..." if has_times else "x, y, z, ..."
@@ -167,9 +167,10 @@ def columns(
 
 
 def identified(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]]:
-    """Names and units of heads; and, by column, the names that follow only from the unit or the order of columns.
+    """Names and units of heads; and, by column, the names that are inferred from units or from the order of columns.
 
-    The only column in a unit of time holds the times. Columns that all have units may stand in the order of `PLAIN`.
+    A column that alone has a unit of time holds the times. If all columns have units, they may be in the order of
+    `PLAIN`.
     """
     parts, plain = resolved(heads), plain_names(len(heads), has_times)
     names, placed = [part.name for part in parts], dict[int, str]()
@@ -188,7 +189,7 @@ def identified(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int,
 
 
 def _unread(heads: list[str], names: list[str]) -> list[str]:
-    # Lines about columns that are not read, with suggestions for the first few.
+    # Notes about columns that are not read, with suggestions for the first few.
     unread = [
         head for head, name in zip(heads, names, strict=True) if not name and head and not _BESIDE.fullmatch(head)
     ]
@@ -212,7 +213,7 @@ def _described(parts: list[Head], own_units: dict[int, str], common: dict[int, s
 
 
 def _common(units: str, path: Path) -> dict[int, str]:
-    # The unit of times, lengths and angles that holds for the whole file, by the `id` of the table of such units.
+    # Units of times, lengths and angles that hold for the whole file, by the `id` of the tables of such units.
     common = {id(TIMES): "s", id(LENGTHS): "m", id(ANGLES): "rad"}
     said: set[int] = set()
     for word in map(unit_of, filter(None, re.split(r"[,;\s]+", units))):
@@ -275,6 +276,6 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
 
 
 def _listed(heads: tuple[str, ...]) -> str:
-    # All columns that were found, as far as a line has space.
+    # List the columns that were found, as many as fit into a line.
     words = ", ".join(shown(head) for head in heads[:MAX_LISTED])
     return words + (f" and {len(heads) - MAX_LISTED} more" if len(heads) > MAX_LISTED else "")

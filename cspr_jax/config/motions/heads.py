@@ -1,6 +1,6 @@
 """Heads of the columns of a table: their names and units, in the forms in which people and programs write them.
 
-A unit stands in brackets or parentheses behind a name, `x [mm]`, behind a stroke or an underscore, `x/mm` and `t_ms`.
+A unit follows the name in brackets or parentheses, `x [mm]`, or after a slash or an underscore, `x/mm` and `t_ms`.
 """
 
 import re
@@ -13,7 +13,7 @@ from cspr_jax.schema.quantities import columns_of
 LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0}
 TIMES = {"s": 1.0, "ms": 0.001, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 ANGLES = {"rad": 1.0, "deg": np.pi / 180.0, "°": np.pi / 180.0, "mrad": 0.001}
-# Kinds of columns: their units of length or angle, and by which power of time these are divided.
+# Kinds of columns: units of length or angle, and the power of time that divides these.
 KINDS = {
     "time": (TIMES, 0),
     "length": (LENGTHS, 0),
@@ -73,7 +73,7 @@ NO_UNIT = ("", "-", "1")
 _HEAD = re.compile(r"^([^\[\]()]*?)\s*(?:\[([^\[\]]*)\]|\((.*)\))?$", re.DOTALL)
 _BEHIND = re.compile(r"^(.+?)(?:\s*/\s*|\s+in\s+|\s+|[_.])([a-zµμ°]+)$")
 LONGEST_HEAD = 200  # letters
-# Words that other programs put into names; each group needs all of its columns.
+# Words in the names that other programs use; a group is read only if all of its columns are found.
 _TIME_WORDS = {"timestamp", "stamp", "time", "zeit", "temps", "tiempo", "tempo", "elapsed"}
 _POSITION_WORDS = {"p", "pos", "position", "translation", "coordinate", "coord", "koordinate", "location"}
 _QUATERNION_WORDS = {"q", "quat", "quaternion", "orientation"}
@@ -89,7 +89,7 @@ class Head(NamedTuple):
 
 
 def unit_of(word: str) -> str:
-    """A unit in the words of `KINDS`."""
+    """A unit as `KINDS` spells it."""
     word = word.strip().strip("[]()").strip().lower().replace("²", "^2").replace("**", "^")
     above, _, below = word.partition("/")
     if not below:
@@ -109,13 +109,13 @@ def kind_of_unit(unit: str) -> str | None:
 
 
 def is_unit(word: str) -> bool:
-    """Tell whether a word is a unit of a column, of a rate too."""
+    """Tell whether a word is a unit that a column can have, units of rates included."""
     above, slash, below = unit_of(word).partition("/")
     return kind_of_unit(above) is not None and (not slash or below.rstrip("2").rstrip("^") in TIMES)
 
 
 def resolved(heads: list[str]) -> list[Head]:
-    """Names and units of heads: exact names first, then those of other programs for groups that have none."""
+    """Names and units of heads: exact names first, then names of other programs for groups without exact ones."""
     parts = [_parted(head) for head in heads]
     names = [_exact(stem) for stem, _ in parts]
     for group, letters in (
@@ -139,14 +139,14 @@ def mentioned(text: str) -> list[str]:
 
 
 def units_within(text: str) -> list[str]:
-    """Units among the words of a comment, except those that need not be said."""
+    """Units among the words of a comment, except the default ones."""
     words = re.findall(r"(?<![\w/])(?:[^\W\d_]+|°)(?![\w/])", text.lower())
     units = [unit_of(word) for word in words if word not in ("min", "us")]
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]
 
 
 def _parted(head: str) -> tuple[str, str]:
-    # Stem in small letters, and unit.
+    # Split a head into its stem, in small letters, and its unit.
     plain = head.strip().strip("\"'").strip()
     parts = _HEAD.match(plain) if len(plain) <= LONGEST_HEAD else None
     if parts is None:

@@ -1,7 +1,7 @@
 """Lines above the rows of a table: names of columns, units, directives and comments, each read once.
 
-Names are a line of their own, or else the last comment above the rows that has a name for each column. Where comments
-speak of columns in another way, a line says so, and rows that they contradict are refused.
+Names stand in a line of their own, or else in the last comment above the rows that has a name for each column. A note
+tells the user of comments that mention columns in another way; rows that contradict them are refused.
 """
 
 import csv
@@ -16,9 +16,9 @@ from cspr_jax.errors import ConfigError, shown
 COMMENT_SIGNS = ("#", "%")
 SEPARATORS = (";", "\t", ",")
 MAX_COLUMNS = 1000
-LARGEST_COMMENTS = 1 << 18  # letters of comments above the rows
-MAX_HINTS = 3  # lines about comments
-LONGEST_COMMENT = 1 << 16  # letters of one that may name columns
+LARGEST_COMMENTS = 1 << 18  # largest number of letters of all comments above the rows
+MAX_HINTS = 3  # largest number of notes about comments
+LONGEST_COMMENT = 1 << 16  # letters; longer comments do not name columns
 _SEPARATOR_LINE = re.compile(r"\"?sep=(.)\"?[,;\t ]*", re.IGNORECASE)
 # A word and the unit in brackets behind it, or a unit alone.
 _BLANK_SEPARATED = re.compile(r"[^\s\[(]*\s*\[[^\]]*\]|[^\s\[(]*\s*\([^)]*\)|\S+")
@@ -42,7 +42,7 @@ class Preamble:
         self._units: list[str] | None = None
 
     def takes(self, line: int, text: str) -> bool:
-        """Take a line."""
+        """Read a line, unless it is the first row; tell whether it was read."""
         if is_comment(text):
             self._comment_length += len(text)
             if self._comment_length > LARGEST_COMMENTS:
@@ -86,7 +86,7 @@ class Preamble:
         return next((separator for separator in SEPARATORS if separator in text), None)
 
     def _names_row(self, cells: list[str]) -> bool:
-        # Tell whether comments name the columns of a row that has text too, in columns that are not read.
+        # Tell whether comments name the columns of a row in which columns that are not read hold text.
         _, heads = self._named_by_comment(len(cells))
         if heads is None:
             return False
@@ -125,7 +125,7 @@ class Preamble:
         if heads is not None:
             spare = _empty_at_end(heads)
             heads = heads[: len(heads) - spare]
-            # Empty cells of columns with a name are values that are missing.
+            # Empty cells in columns that have a name are missing values.
             self.tail = max(spare, min(empty, len(cells) - len(heads)))
         else:
             self.tail = empty
@@ -143,7 +143,7 @@ class Preamble:
         )
 
     def _named_by_comment(self, count: int) -> tuple[int, list[str] | None]:
-        # Number and heads of the last comment that has a name for each column.
+        # Line number and heads of the last comment that has a name for each column.
         for line, text in reversed(self._comments):
             for heads in _readings(text, count):
                 names = {part.name for part in identified(heads, self.has_times)[0]}
@@ -153,7 +153,7 @@ class Preamble:
         return 0, None
 
     def _commented_units(self, count: int, heads: list[str] | None) -> dict[int, str]:
-        # Units of the last comment that has nothing but one for each column, or the names of a header with units.
+        # Units from the last comment that consists of one unit for each column, or of the names of a header with units.
         plain = plain_names(count, self.has_times)
         names = list(plain) if heads is None else [part.name for part in identified(heads, self.has_times)[0]]
         if len(names) != count:
@@ -171,8 +171,8 @@ class Preamble:
     def _refuse_contradictions(
         self, count: int, is_bare: bool, is_unnamed: bool, has_units: bool, heads: list[str]
     ) -> list[str]:
-        # Refuse comments that name columns or units in a way that is not read, where nothing else names them; return
-        # notes about other comments.
+        # Refuse comments that seem to name columns or units, in a form that is not read, where nothing else names
+        # them; return notes about the other comments.
         free = [(line, text) for line, text in self._comments if len(text) <= LONGEST_COMMENT and not _is_said(text)]
         plain = plain_names(count, self.has_times)
         spoken = [(line, text, mentioned(text)) for line, text in free]
@@ -221,7 +221,7 @@ class Preamble:
 
 
 def is_comment(text: str) -> bool:
-    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted."""
+    """Tell whether a line is nothing but a comment, possibly quoted by a spreadsheet."""
     return text.lstrip(' \t"').startswith(COMMENT_SIGNS)
 
 
@@ -264,7 +264,7 @@ def _empty_at_end(cells: list[str]) -> int:
 
 
 def _readings(text: str, count: int) -> list[list[str]]:
-    # All readings of a comment as so many words, by its separators, with and without what ends in a colon.
+    # All ways to split a comment into that number of words, with and without a first part that ends in a colon.
     if len(text) > LONGEST_COMMENT:
         return []
     readings = []
@@ -288,11 +288,11 @@ def _are_units(words: list[str], names: list[str]) -> bool:
 
 
 def _is_said(text: str) -> bool:
-    # Tell whether a comment is a directive of another kind, such as the units.
+    # Tell whether a comment is a directive, such as for units.
     return text.partition(":")[0].strip().lower() in ("units", "unit", "z", "z_axis", "point", "interpolation", "ends")
 
 
 def _in_order(names: list[str], plain: tuple[str, ...]) -> bool:
-    # Tell whether names stand in the order in which columns without names are taken.
+    # Tell whether names are in the order that is assumed for columns without names.
     left = iter(plain)
     return all(name in left for name in dict.fromkeys(names))

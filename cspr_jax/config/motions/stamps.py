@@ -1,4 +1,4 @@
-"""Times of tables as they are written: stamps since 1970 have more digits than floats, and these show their unit."""
+"""Times of tables as written: stamps since 1970 have more digits than floats, and their size shows their unit."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from cspr_jax.config.motions.heads import TIMES
 from cspr_jax.numerics.shapes import Float
 
-# A whole number without a unit is a stamp in the unit in which it lies between these times, s since 1970.
+# An integer without a unit is a stamp in that unit in which it lies between these times, s since 1970.
 EPOCH = (3e8, 5e9)
 UNITS = ("ms", "us", "ns")
-LARGE = 1e6  # floats hold smaller stamps to 1e-10
-LONGEST = 60  # digits
-CLOSER = 100.0  # a stamp nearly repeats if its step is that many times smaller than the median one
+LARGE = 1e6  # floats resolve smaller stamps to 1e-10
+LONGEST = 60  # largest number of digits of a stamp
+CLOSER = 100.0  # a stamp nearly repeats the one before if the step is this many times smaller than the median step
 _DIGITS, _DECIMAL = re.compile(r"[0-9]+"), re.compile(r"[-+]?[0-9]+\.?[0-9]*")
 
 
 def unit_of_stamps(cell: str) -> str | None:
-    """Unit other than seconds in which a whole number is a time of our days."""
+    """Unit other than seconds in which an integer is a time between those of `EPOCH`."""
     if not _DIGITS.fullmatch(cell) or len(cell) > LONGEST:
         return None
     return next((unit for unit in UNITS if EPOCH[0] <= float(cell) * TIMES[unit] < EPOCH[1]), None)
 
 
 class Stamps:
-    """Times of a table less a whole number near the first one, where floats would lose digits of them."""
+    """Times of a table, with an integer offset subtracted where floats would lose their last digits."""
 
     def __init__(self, first: str = "0") -> None:
         is_large = _is_decimal(first) and abs(float(first)) >= LARGE
@@ -43,7 +43,7 @@ class Stamps:
 
 
 def near_repeat(times: Float[np.ndarray, "n"]) -> tuple[int, float] | None:
-    """First two stamps that nearly repeat."""
+    """Index of the first stamp that the next one nearly repeats, and the median step over the step between them."""
     steps = np.diff(times)
     steps = np.where(steps > 0.0, steps, np.inf)
     if len(steps) < 4:

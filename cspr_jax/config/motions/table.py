@@ -16,8 +16,8 @@ _FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 Z_AXES = ("down", "up")
 # Points of a platform whose positions a motion may have.
 POINTS = ("mass-centre", "origin")
-FAR = 30.0  # sizes of the robot; farther motions are probably in other units
-# Motions of so many rows at whole numbers of seconds are probably in milliseconds, or without units.
+FAR = 30.0  # motions that go beyond this multiple of the robot's size are probably in other units
+# If this many rows or more have integer times, these are probably milliseconds, or numbers of rows.
 MANY = 50
 
 
@@ -33,11 +33,11 @@ class MotionTable:
         accelerations: (n, 3) m/s^2, or None.
         angular_velocities: (n, 3) rad/s, fixed axes, or None.
         angular_accelerations: (n, 3) rad/s^2, fixed axes, or None.
-        interpolation: that the file names, of `curves.interpolation.INTERPOLATIONS`, or None.
-        ends: that the file names, of `curves.interpolation.ENDS`, or None.
-        z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
-        point: whose positions it has, one of `POINTS`; None: it does not say.
-        from_reference: whether orientations count from the reference orientation, and not from the platform's own axes.
+        interpolation: interpolation that the file asks for, one of `curves.interpolation.INTERPOLATIONS`, or None.
+        ends: ends that the file asks for, one of `curves.interpolation.ENDS`, or None.
+        z_axis: direction of its z axis, "up" or "down"; None: as in the file of the robot.
+        point: point whose positions it has, one of `POINTS`; None: unknown.
+        from_reference: whether orientations are relative to the reference orientation, not to the platform's own axes.
         is_planar: whether it has no y, as motions of planar robots may; its y is 0.
         notes: lines for the user.
     """
@@ -80,9 +80,9 @@ class MotionPieces:
     Fields:
         knots: (m + 1,) times between the pieces, increasing, s.
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
-        quaternion: (m, degree + 1, 4) likewise, scalar first, of any length but zero; or None.
-        z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
-        point: whose positions it has, one of `POINTS`; None: it does not say.
+        quaternion: (m, degree + 1, 4) likewise, scalar first, of any norm but zero; or None.
+        z_axis: direction of its z axis, "up" or "down"; None: as in the file of the robot.
+        point: point whose positions it has, one of `POINTS`; None: unknown.
         is_planar: whether it has no y, as motions of planar robots may; its y is 0.
         notes: lines for the user.
     """
@@ -104,7 +104,7 @@ class MotionPieces:
 
 
 def unit_hints(table: MotionTable, base_points: Float[np.ndarray, "n_cables 3"]) -> list[str]:
-    """Units that a table probably has, other than those that it is read in."""
+    """Hints that the units of a table are probably others than those in which it is read."""
     points = np.asarray(base_points, float)
     extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     distance = float(np.abs(table.positions - points.mean(axis=0)).max())

@@ -1,7 +1,7 @@
 """Tables of motions as text, such as CSV: streamed, so that the number of rows is not limited by memory.
 
-Separators are commas, semicolons, tabs or spaces; behind semicolons and tabs decimal commas are taken too. Each error
-becomes one line with the number of its line in the file and the name of its column.
+Separators are commas, semicolons, tabs or spaces; with semicolons and tabs, decimal commas are read too. Error messages
+name the line of the file and the column.
 """
 
 import dataclasses
@@ -24,35 +24,36 @@ from cspr_jax.config.reading import decoded, opened
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import look_alike
 
-BLOCK = 4 << 20  # bytes that are read at a time
+BLOCK = 4 << 20  # number of bytes that are read at a time
 LARGEST_LINE = 1 << 16
-MAX_ROWS = 1_000_000  # of a table that is read as a whole
-WINDOW = 200_000  # rows
-# Rows of its neighbours that a window includes: the influence of a row on a spline falls by a factor 0.27 (cubic) or
-# 0.43 (quintic) from one row to the next.
+MAX_ROWS = 1_000_000  # largest number of rows of a table that is read in full
+WINDOW = 200_000  # number of rows of a window
+# Number of rows of the neighbours that a window includes on each side: from one row to the next, the influence of a row
+# on a spline falls by a factor of 0.27 (cubic) or 0.43 (quintic).
 OVERLAP = 100
-# Lengths of quaternions that are taken for unit ones, that are normalised with a note, and that are refused beyond.
+# Quaternions whose norm is within UNIT of 1 count as unit ones; others from SHORTEST to LONGEST are normalised with a
+# note, and all others refused.
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
-MEETING = 1e-6  # fraction of the size of a motion by which its legs may miss each other
+MEETING = 1e-6  # largest gap where legs meet, as a fraction of the extent of the motion
 
-EMPTY = (",", ";", "\t", " ")  # first characters of lines that may hold separators only
+EMPTY = (",", ";", "\t", " ")  # first characters of lines that may consist of separators alone
 _COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)
 _EMPTY_LINE = re.compile(r"^[,;\t ]+$", re.MULTILINE)
 
 
 class TooLongError(ConfigError):
-    """A table of more rows than are read as a whole."""
+    """A table with too many rows to be read in full."""
 
 
 @dataclasses.dataclass(frozen=True)
 class MotionWindow:
-    """Consecutive rows of a table, with some of the rows before and behind them.
+    """Consecutive rows of a table, with some of the rows before and after them.
 
     Fields:
-        table: of all these rows.
-        first: index of the row at which the window itself begins; the one before ended there.
-        last: index of its last row.
-        is_last: whether no other follows.
+        table: all these rows.
+        first: index, in `table`, of the row at which the window itself begins and the window before it ends.
+        last: index, in `table`, of the last row of the window itself.
+        is_last: whether it is the last window.
     """
 
     table: MotionTable
@@ -62,7 +63,7 @@ class MotionWindow:
 
 
 def read(path: Path, *, has_times: bool = True) -> MotionTable:
-    """A table of a motion, or of the points of a path, as a whole."""
+    """A table of a motion, or of the points of a path, read in full."""
     window = next(windows(path, MAX_ROWS, has_times=has_times))
     if not window.is_last:
         raise TooLongError(path, f"more than {MAX_ROWS} rows: must be fewer where a motion is read as a whole")
@@ -120,7 +121,7 @@ class _Reader:
             self.preamble.end()
 
     def _above(self, text: str, line: int) -> int | None:
-        # Count of the lines above the first row; None: all of them.
+        # Number of lines above the first row; None: there is no row.
         for k, row in enumerate(text.split("\n")):
             if not self.preamble.takes(line + k, row):
                 return k
@@ -150,7 +151,7 @@ class _Reader:
         )
 
     def _begin(self, text: str) -> None:
-        # Take over what stands above the rows, and how the first row is to be read.
+        # Take columns from what stands above the rows, and the separator from the first row.
         self.columns, self.delimiter = self.preamble.columns, self.preamble.delimiter
         self.directives = self.preamble.directives
         self.notes |= dict.fromkeys(self.columns.notes)
@@ -182,7 +183,7 @@ class _Reader:
         plain = text.replace(",", ".") if self.delimiter in (";", "\t") else text
         if "%" in plain:
             plain = _COMMENT_LINE.sub("", plain)
-        # A search for plain text is far faster than one for a pattern.
+        # Searching for plain text is far faster than for a pattern.
         if plain[:1] in EMPTY or any(f"\n{separator}" in plain for separator in EMPTY):
             plain = _EMPTY_LINE.sub("", plain)
         if self.preamble.tail:
@@ -192,7 +193,7 @@ class _Reader:
             rows = self._loaded(plain)
         except ValueError as error:
             self._refuse(text, line)
-            # Columns that are not read may turn to text further down.
+            # Columns that are not read may hold text in later rows.
             unread: dict[int | str, Callable[[str], float]] = {
                 k: _zero for k, name in enumerate(self.columns.names) if not name
             }
@@ -206,7 +207,7 @@ class _Reader:
 
     def _loaded(self, plain: str) -> np.ndarray:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of a block without rows
+            warnings.simplefilter("ignore", UserWarning)  # about a block without rows
             return np.loadtxt(
                 io.StringIO(plain),
                 delimiter=self.delimiter,
@@ -291,7 +292,7 @@ class _Reader:
         return self.stamps.shown(float(row[self.columns.names.index("t")]))
 
     def _check_joins(self, chain: np.ndarray, steps: np.ndarray, before: int, text: str, line: int) -> None:
-        # Legs meet in two rows of one time; only their accelerations may differ.
+        # Two rows of the same time are the end and start of two legs; only their accelerations may differ.
         joins = np.flatnonzero(steps == 0.0)
         for group in ("positions", "velocities"):
             values = self.columns.values(group, chain)
@@ -323,7 +324,7 @@ class _Reader:
         rotations, tilts = self.columns.values("rotations", rows), self.columns.values("tilts", rows)
         if rotations is None and tilts is None:
             return None
-        from scipy.spatial.transform import Rotation  # takes time, and only angles need it
+        from scipy.spatial.transform import Rotation  # importing it takes time, and only angles need it
 
         if rotations is not None:  # R = Rz(yaw) Ry(pitch) Rx(roll)
             return Rotation.from_euler("ZYX", rotations[:, ::-1]).as_quat(scalar_first=True)
@@ -367,7 +368,7 @@ def _zero(cell: str) -> float:
 
 
 def _line_of(text: str, line: int, row: int) -> int:
-    # Number of the line of a row of a block.
+    # Line number of a row of a block.
     count = -1
     for number, content in enumerate(text.split("\n"), line):
         count += has_content(content)

@@ -1,11 +1,11 @@
 """Affine bounds: Taylor models of the first order, over a block of time.
 
 With s from -1 at the start of a block to 1 at its end, f(s) is within `radius` of `middle + linear s`. Sums, products,
-quotients and roots of such bounds are bounds again. A smooth function's radius shrinks with the square of the length of
-the block, so that halving a block decides what is open, and functions that only have to be continuous have bounds too.
-Models of the second order, `middle + linear s + square s^2`, shrink with the third power; few operations know them.
-Each operation adds a bound of its rounding error to the radius. Operations are compiled functions: kernels of hundreds
-of them are traced, and lowered for XLA, as calls of a few.
+quotients and roots of such bounds are bounds again. The radius of a smooth function shrinks with the square of the
+length of the block, so that halving blocks settles what is undecided; functions that are only continuous have bounds
+too. Remainders of models of the second order, `middle + linear s + square s^2`, shrink with the third power; few
+operations support them. Each operation adds a bound of its rounding error to the radius. Operations are compiled
+functions, so that a kernel of hundreds of them is traced and lowered for XLA as calls of a few.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class AffineBounds(NamedTuple):
     """Bounds of a function over one block, or of an array of functions; leaves of one shape.
 
     Fields:
-        middle: (...) of the line, at the middle of the block.
+        middle: (...) value of the line at the middle of the block.
         linear: (...) coefficient of s: half of the rise of the line from start to end.
         radius: (...) bound of the remainder; NaN where there is none.
-        square: (...) coefficient of s^2; None: the remainder is that of a line.
+        square: (...) coefficient of s^2; None: the bounds are around a line.
     """
 
     middle: Any
@@ -37,7 +37,7 @@ class AffineBounds(NamedTuple):
     square: Any = None
 
     def half_range(self) -> Float[Array, "..."]:
-        """How far the function may be from `middle`."""
+        """Largest distance of the function from `middle`."""
         bound = jnp.abs(self.linear) + self.radius
         return bound if self.square is None else bound + jnp.abs(self.square)
 
@@ -49,7 +49,7 @@ class AffineBounds(NamedTuple):
         """Upper bound."""
         if self.square is None:
             return self.middle + self.half_range()
-        # The top of a parabola may lie within the block.
+        # The vertex of a parabola may lie within the block.
         rise, is_within = jnp.abs(self.linear), -2.0 * self.square > jnp.abs(self.linear)
         top = jnp.where(is_within, -0.25 * rise**2 / jnp.where(is_within, self.square, 1.0), rise + self.square)
         return self.middle + top + self.radius
@@ -59,7 +59,7 @@ class AffineBounds(NamedTuple):
         return jnp.abs(self.middle) + self.half_range()
 
     def each(self, change) -> "AffineBounds":
-        """The same bounds in another order, such as transposed or with another dimension."""
+        """The same bounds with all arrays rearranged by a function, such as a transposition."""
         return jax.tree.map(change, self)
 
     def total(self, axis: int = -1) -> "AffineBounds":
@@ -96,13 +96,13 @@ class AffineBounds(NamedTuple):
 
 
 def rounded(bounds: AffineBounds, magnitude: Any = 0.0) -> AffineBounds:
-    """Bounds with a radius that is larger by the rounding of numbers as large as they are, or more."""
+    """Bounds whose radius is widened by the rounding of their own numbers, and of others up to a magnitude."""
     return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.magnitude() + magnitude))
 
 
 @partial(jax.jit, static_argnames="axis")
 def _total(f: AffineBounds, axis: int) -> AffineBounds:
-    # Up to some thirty terms.
+    # The rounding errors are bounded for up to some thirty terms.
     total = f.each(lambda x: jnp.sum(x, axis=axis))
     return total._replace(radius=total.radius + 2.0 * ROUNDING * jnp.sum(f.magnitude(), axis=axis))
 
@@ -128,7 +128,7 @@ def _scaled(f: AffineBounds, constants: Array) -> AffineBounds:
 
 
 def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
-    # Bounds of f g without rounding errors, and the magnitude of the numbers in its line; s^2 is between 0 and 1.
+    # Bounds of f g without rounding errors, and the magnitude of the numbers that enter them; s^2 is between 0 and 1.
     if f.square is not None or g.square is not None:
         return _parabola_products(f, g)
     half = 0.5 * f.linear * g.linear
@@ -139,7 +139,7 @@ def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
 
 
 def _parabola_products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
-    # s^3 is within 1/4 of 3 s / 4, s^4 between 0 and 1.
+    # s^3 is within 1/4 of 3 s / 4, and s^4 between 0 and 1.
     f, g = (x._replace(square=squares(x)) for x in (f, g))
     cubic, quartic = f.linear * g.square + f.square * g.linear, f.square * g.square
     norms = [jnp.abs(x.middle) + jnp.abs(x.linear) + jnp.abs(x.square) for x in (f, g)]
@@ -165,7 +165,7 @@ def squares(f: AffineBounds) -> Float[Array, "..."]:
 
 
 def flat(f: AffineBounds) -> AffineBounds:
-    """Bounds around a line."""
+    """Bounds around a line, from bounds around a parabola."""
     if f.square is None:
         return f
     half = 0.5 * f.square
@@ -210,7 +210,7 @@ def norm_squared(f: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def norm(f: AffineBounds) -> AffineBounds:
-    """Bounds of the lengths of vectors, also of those that vanish."""
+    """Bounds of the lengths of vectors, which may vanish within the block."""
     f = flat(f)
     # A length is convex: it lies below the chord between the ends of the line, and above its part along any direction.
     start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.linear, f.linear))
@@ -233,9 +233,9 @@ def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def rotated(matrix: AffineBounds | Float[Array, "... m n"], f: AffineBounds | Float[Array, "... n"]) -> AffineBounds:
-    """Bounds of matrices times vectors; one of both may be constant."""
+    """Bounds of matrices times vectors; either of the two may be constant."""
     across: Any = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
-    # Constants go to the right.
+    # `dot` takes constants as its second argument.
     return dot(matrix, across) if isinstance(matrix, AffineBounds) else dot(across, matrix)
 
 

@@ -20,15 +20,15 @@ import numpy as np
 from cspr_jax.numerics.shapes import Float
 
 DEGREE = 18
-# Bound of Lebesgue's constant of the nodes, by which an error of the values can grow between them.
+# Bound of Lebesgue's constant, the factor by which an error of the values can grow between the nodes.
 LEBESGUE = 3.0
-# Sums rho of the semi-axes of the ellipse; the ellipse with the smaller remainder counts.
+# Sums rho of the semi-axes of the ellipses that are tried; the smallest remainder counts.
 RADII = (2.5, 6.0)
 
 
 @functools.cache
 def nodes() -> Float[np.ndarray, "n+1"]:
-    """Chebyshev's nodes, both ends among them."""
+    """Chebyshev's nodes, including both ends."""
     return -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
 
 
@@ -36,7 +36,7 @@ def nodes() -> Float[np.ndarray, "n+1"]:
 def bernstein() -> Float[np.ndarray, "n+1 n+1"]:
     """Matrix from values at the nodes to Bernstein coefficients."""
     exact = [(1 + Fraction(float(x))) / 2 for x in nodes()]
-    scale = max(node.denominator for node in exact)  # a power of two, as all of them
+    scale = max(node.denominator for node in exact)  # all denominators are powers of two
     full, columns = [int(node * scale) for node in exact], []
     for k, node in enumerate(full):
         # Lagrange's polynomial of one node, a product of linear ones: coefficients of (1 - t)^(n - j) t^j.
@@ -44,7 +44,7 @@ def bernstein() -> Float[np.ndarray, "n+1 n+1"]:
         for other in full[:k] + full[k + 1 :]:
             powers = [(scale - other) * a - other * b for a, b in zip([0, *powers], [*powers, 0], strict=True)]
             denominator *= node - other
-        # Python rounds quotients of integers once, however large they are; no -0.
+        # Python rounds quotients of integers of any size only once; adding 0 avoids -0.
         columns.append([power / (math.comb(DEGREE, j) * denominator) + 0.0 for j, power in enumerate(powers)])
     return np.array(columns).T
 

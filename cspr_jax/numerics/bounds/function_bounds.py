@@ -46,7 +46,7 @@ def arc_sine(f: AffineBounds) -> AffineBounds:
     """Bounds of the angle of a sine, between -pi/2 and pi/2."""
     f = flat(f)
     magnitude = jnp.where(f.magnitude() < LARGEST_SINE, f.magnitude(), jnp.nan)
-    # The second derivative, x (1 - x^2)^-1.5, changes its sign with x, and is largest where |x| is.
+    # The second derivative, x (1 - x^2)^-1.5, has the sign of x and grows with |x|.
     second_derivative = 0.5 * magnitude * f.half_range() ** 2 * (1.0 - magnitude**2) ** -1.5
     value, derivative = jnp.arcsin(f.middle), (1.0 - f.middle**2) ** -0.5
     return rounded(AffineBounds(value, derivative * f.linear, derivative * f.radius + second_derivative))
@@ -60,14 +60,14 @@ def _positive(f: AffineBounds) -> Array:
 def deviation(
     f: AffineBounds, value: Float[Array, "..."], first: Float[Array, "..."], second: Float[Array, "..."]
 ) -> AffineBounds:
-    """Bounds of F(f) for a function F whose second derivative keeps its sign."""
-    # By Taylor about the middle, the remainder is between 0 and F'' half_range^2 / 2.
+    """Bounds of F(f), from values of F and F' in the middle and a bound of F'', which must not change its sign."""
+    # By Taylor's theorem about the middle, the remainder is between 0 and F'' half_range^2 / 2.
     half = 0.25 * second * f.half_range() ** 2
     return rounded(AffineBounds(value + half, first * f.linear, jnp.abs(first) * f.radius + jnp.abs(half)), value)
 
 
 def _parabola_deviation(f: AffineBounds, values: tuple[Array, Array, Array], third: Array) -> AffineBounds:
-    # F(f) from F and its first two derivatives in the middle, and a bound of the third one over the block.
+    # Bounds of F(f), from F and its first two derivatives in the middle and a bound of the third over the block.
     value, derivative, second_derivative = values
     off, squared = jnp.abs(f.square) + f.radius, 0.5 * second_derivative * f.linear**2
     radius = jnp.abs(derivative) * f.radius + 0.5 * jnp.abs(second_derivative) * (2.0 * jnp.abs(f.linear) + off) * off
@@ -82,8 +82,8 @@ def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
     """Bounds of sin(pi f) and cos(pi f)."""
     f = flat(f)
     sine, cosine = elementary.sincospi(f.middle)
-    # At d from the middle, sin(m + d) = sin m cos d + cos m sin d, with cos d from 1 - d^2 / 2 to 1, and sin d within
-    # |d|^3 / 6 of d.
+    # At a distance d from the middle m, sin(m + d) = sin m cos d + cos m sin d; cos d is from 1 - d^2 / 2 to 1, and sin d
+    # within |d|^3 / 6 of d.
     half_range, half = math.pi * f.half_range(), (0.5 * math.pi * f.half_range()) ** 2
 
     def one(value: Array, derivative: Array) -> AffineBounds:
@@ -94,7 +94,7 @@ def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
 
 
 def determinant(matrix: AffineBounds) -> AffineBounds:
-    """Bounds of the determinant of a small matrix, by elimination with the largest pivots in the middle."""
+    """Bounds of the determinant of a small matrix, by elimination; pivots are the largest entries in the middle."""
     rest, product = matrix, matrix.each(lambda x: jnp.ones((), x.dtype))
     product = product._replace(linear=jnp.zeros_like(product.linear), radius=jnp.zeros_like(product.radius))
     while len(rest.middle) > 1:

@@ -1,8 +1,8 @@
 """Interval jets: bounds of a function and of its first two derivatives over many blocks at once.
 
-Formulas of +, -, *, ** that are written for arrays take jets as well. Derivatives follow from the product rule and the
-chain rule, in interval arithmetic. The aim is a bound of the second derivative: over a block of width w no value lies
-further below the chord of its ends than w^2 / 8 times the largest second derivative.
+Formulas of +, -, *, / and ** that are written for arrays take jets as well. Derivatives follow from the product rule
+and the chain rule, in interval arithmetic. Their purpose is a bound of the second derivative: over a block of width w
+no value lies further below the chord between its ends than w^2 / 8 times the largest second derivative.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Jet:
         second_derivative: bounds of the second derivative, likewise.
     """
 
-    # NumPy arrays leave arithmetic with jets to the jets.
+    # Makes NumPy arrays leave arithmetic with jets to the methods of jets.
     __array_ufunc__ = None
 
     def __init__(self, value: Interval, derivative: Interval, second_derivative: Interval) -> None:
@@ -58,7 +58,7 @@ class Jet:
         return Jet(*((change(*(x[0] for x in part)), change(*(x[1] for x in part))) for part in parts))
 
     def expanded(self, axis: int) -> "Jet":
-        """The same bounds with one more dimension."""
+        """The same bounds with a new axis."""
         return self._each(lambda x: np.expand_dims(x, axis))
 
     def joined(self, other: "Jet") -> "Jet":
@@ -134,6 +134,6 @@ def lowest(ends: Float[np.ndarray, "2 ..."], jet: Jet) -> Float[np.ndarray, "...
     minimum = ends.min(0)
     with np.errstate(invalid="ignore"):
         low = minimum - np.maximum(jet.second_derivative[1], 0.0) / 8.0
-        # A function whose derivative has one sign is nowhere below its lower end.
+        # A function whose derivative keeps its sign is nowhere below the lower of its values at both ends.
         steady = (jet.derivative[0] >= 0.0) | (jet.derivative[1] <= 0.0)
     return np.where(steady, minimum, np.where(np.isnan(low), -np.inf, low))

@@ -8,7 +8,7 @@ from cspr_jax.numerics.shapes import Float
 
 
 def united(intervals: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
-    """Intervals of which none overlaps or touches another one."""
+    """The same union as intervals that neither overlap nor touch."""
     merged: list[list[float]] = []
     for start, end in sorted(intervals.tolist()):
         if merged and start <= merged[-1][1]:

@@ -1,8 +1,8 @@
 """Affine bounds of piecewise polynomials over blocks of their variable, each within a piece or over many of them.
 
-Over a piece a polynomial lies within the hull of its Bernstein coefficients, and so does its remainder beside a
-straight line. A block that holds many pieces gets one line, and the largest remainder of any of them. Beside a
-parabola, which a block within one piece may get, the remainder is smaller.
+Over a piece a polynomial lies within the hull of its Bernstein coefficients, and so does its deviation from a straight
+line. A block that holds many pieces gets one line, and the largest deviation of any of them. A block within one piece
+may get a parabola instead, from which deviations are smaller.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class PieceParts(NamedTuple):
     """Overlaps of k blocks and m pieces.
 
     Fields:
-        block: (n_parts,) block of each part, in order.
-        piece: (n_parts,) piece of each.
-        of_piece: (2, n_parts) where it starts and ends in the piece, from 0 to 1.
-        of_block: (2, n_parts) where it does in the block, from -1 to 1.
-        width: (n_parts,) of the piece.
+        block: (n_parts,) index of the block of each overlap, increasing.
+        piece: (n_parts,) index of its piece.
+        of_piece: (2, n_parts) its start and end within the piece, from 0 to 1.
+        of_block: (2, n_parts) its start and end within the block, from -1 to 1.
+        width: (n_parts,) width of the piece.
     """
 
     block: np.ndarray
@@ -41,9 +41,9 @@ def overlaps(
     end: Float[np.ndarray, "k"],
     tables: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> PieceParts:
-    """Parts of pieces that blocks hold."""
+    """Overlaps of blocks and pieces."""
     of_knots, of_blocks = (np.zeros(len(knots), int), np.zeros(len(start), int)) if tables is None else tables
-    # NumPy orders complex numbers by their real parts first.
+    # Complex numbers sort by their real parts, the tables, and then by their imaginary parts, the knots.
     ordered = of_knots + 1j * knots
     earliest, latest = np.searchsorted(of_knots, of_blocks), np.searchsorted(of_knots, of_blocks, side="right") - 2
     first = np.clip(np.searchsorted(ordered, of_blocks + 1j * start, side="right") - 1, earliest, latest)
@@ -53,10 +53,10 @@ def overlaps(
     knot = first[block] + np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
     low, high, width = np.maximum(knots[knot], start[block]), np.minimum(knots[knot + 1], end[block]), np.diff(knots)
     of_piece = (np.stack([low, high]) - knots[knot]) / width[knot]
-    # A block that is too short for its numbers to differ gets no bounds.
+    # A block whose start equals its end in floating point gets NaN, hence no bounds.
     with np.errstate(invalid="ignore"):
         of_block = 2.0 * (np.stack([low, high]) - start[block]) / (end - start)[block] - 1.0
-    # Each table has one knot more than pieces.
+    # Each table has one more knot than pieces.
     return PieceParts(block, knot - of_blocks[block], of_piece, of_block, width[knot])
 
 
@@ -91,7 +91,7 @@ def _between(coefficients: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.
     after = _split(coefficients, high[:, None, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         fraction = np.where(high > 0.0, low / high, 0.0)[:, None, None]
-    # Reversed, the part up to a time is the part from there on.
+    # In reverse order the part up to a fraction is the part from it on.
     return _split(after[:, ::-1], 1.0 - fraction)[:, ::-1]
 
 
@@ -123,8 +123,8 @@ def _affine(coefficients: np.ndarray, parts: PieceParts) -> AffineBounds:
 
 
 def _parabola(coefficients: np.ndarray) -> AffineBounds:
-    # The parabola has the mean second difference of the coefficients, which are those over the block.
-    # Sums along a first axis are fast.
+    # The parabola has the mean second difference of the coefficients, which are Bernstein coefficients over the block.
+    # Move their axis to the front, along which sums are fast.
     control, degree = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0)), coefficients.shape[1] - 1
     number, scale = np.arange(degree + 1)[:, None, None], max(degree * (degree - 1), 1)
     # Coefficients of s and of s^2 over [-1, 1].

@@ -7,7 +7,7 @@ from cspr_jax.numerics.bounds.function_bounds import reciprocal
 
 
 class RotationBounds(NamedTuple):
-    """Bounds of a rotation and of how it turns.
+    """Bounds of a rotation and of its angular velocity and acceleration.
 
     Fields:
         rotation: (3, 3) from body to fixed axes.
@@ -47,7 +47,7 @@ def unit_rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: 
 
 
 def _across(f: AffineBounds, q: AffineBounds) -> AffineBounds:
-    # 2 vec(f q*).
+    # 2 vec(f q*) of quaternions f and q.
     (f_scalar, f_vector), (q_scalar, q_vector) = (
         (bounds.each(lambda x: x[:1]), bounds.each(lambda x: x[1:])) for bounds in (f, q)
     )

@@ -1,7 +1,7 @@
 """Bounds on a function and its first two derivatives over an interval, and their arithmetic.
 
-A proof that holds between samples needs a bound of a second derivative. Instead of deriving each constraint by hand,
-its factors are bounded once, and the bounds combined by Leibniz' rule.
+A proof that holds between samples needs a bound of the second derivative of each constraint. Instead of deriving it by
+hand, the factors of constraints are bounded, and their bounds combined by Leibniz' rule.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cspr_jax.numerics.shapes import Float
 
 
 def hypotenuse(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
-    """Length of a vector in a plane; `jnp.hypot` takes several times as long, for the sake of squares that overflow."""
+    """Length of a plane vector; `jnp.hypot` takes several times as long, since it keeps squares from overflowing."""
     return jnp.sqrt(a * a + b * b)
 
 
@@ -50,7 +50,7 @@ class Bounds(NamedTuple):
         return Bounds(magnitude * self.value, magnitude * self.derivative, magnitude * self.curvature)
 
     def combined(self, other: "Bounds") -> "Bounds":
-        """Bounds of the length of a vector whose perpendicular components have these bounds."""
+        """Bounds of the length of a vector, from bounds of two components at a right angle."""
         return Bounds(
             hypotenuse(self.value, other.value),
             hypotenuse(self.derivative, other.derivative),
@@ -58,7 +58,7 @@ class Bounds(NamedTuple):
         )
 
     def rotated(self, rate: Array) -> "Bounds":
-        """Bounds of the length of a vector and its derivatives, seen from axes it turns against at a constant rate."""
+        """Bounds of the lengths of a vector and its derivatives in axes that rotate at a constant rate."""
         return Bounds(
             self.value,
             self.derivative + rate * self.value,

@@ -1,1 +1,1 @@
-"""Small vectors: lanes, rotations, axes of files, and several numbers in one array."""
+"""Small vectors: lanes, rotations, axes of files, and several numbers packed into one."""

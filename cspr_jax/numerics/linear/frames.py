@@ -1,7 +1,7 @@
 """Axes of a robot file beside those of the kernels: z down, origin in the centroid of the spools.
 
-Coordinates cross here, once, in the float64 numbers of the file: the centroid is subtracted before anything is
-computed, so that no digit is lost on a robot whose spools lie far from the origin of its axes.
+This module alone converts coordinates, in float64: the centroid is subtracted before anything else is computed, so that
+no digits are lost on a robot whose spools lie far from the origin of its axes.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _SIGNS = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
 
 
 def _numbers(values):
-    # Convert to float64, except arrays of jax: they stay as they are, so that they can be traced.
+    # Convert to float64, except arrays of jax, which may be traced.
     return values if hasattr(values, "at") else np.asarray(values, float)
 
 
 def _beside(vector, array):
-    # Give the vector the rank of the array: callers may have jax raise where ranks differ.
+    # Give the vector the rank of the array, since callers may have set jax to raise an error where ranks differ.
     return vector.reshape((1,) * (array.ndim - 1) + vector.shape)
 
 
@@ -34,7 +34,7 @@ class Frame:
     """Axes and origin of a robot file, relative to those of the kernels.
 
     Fields:
-        signs: (3,) +1 and -1 between the axes of the file and the kernels'; the same in both directions.
+        signs: (3,) factors, +1 or -1, from axes of the file to axes of the kernels, and back.
         origin: (3,) centroid of the spools in the file's axes, to the nearest float64, m.
         rest: (3,) rounding error of the origin, m.
     """
@@ -64,21 +64,21 @@ class Frame:
         return self.origin[2] + (_numbers(depth) * self.signs[2] + self.rest[2])
 
     def rotated(self, vectors) -> Float[np.ndarray, "... 3"]:
-        """Vectors in the other axes, either way."""
+        """Vectors of the file in the kernels' axes, or the reverse."""
         array = _numbers(vectors)
         return array * _beside(self.signs, array)
 
     def rotated_tensor(self, tensor):
-        """A tensor in the other axes, either way."""
+        """A tensor of the file in the kernels' axes, or the reverse."""
         return self.signs[:, None] * tensor * self.signs[None]
 
     def rotated_angles(self, angles) -> Float[np.ndarray, "... 3"]:
-        """Angles of tilt and torsion in the other axes, either way."""
+        """Angles of tilt and torsion of the file in the kernels' axes, or the reverse."""
         return np.asarray(angles, float) * np.array([self.signs[1], 1.0, self.signs[2]])
 
     def rotated_quaternions(self, quaternions) -> Float[np.ndarray, "... 4"]:
-        """Orientations in the other axes, either way."""
-        # The scalar part keeps its sign, like the component along x.
+        """Orientations of the file in the kernels' axes, or the reverse."""
+        # The scalar part keeps its sign, as the component along x does.
         array = _numbers(quaternions)
         return array * _beside(self.signs[np.array([0, 0, 1, 2])], array)
 

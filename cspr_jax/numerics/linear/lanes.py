@@ -1,4 +1,4 @@
-"""Small vectors as tuples of arrays, one lane a case: XLA then makes one loop over the cases of a long formula."""
+"""Small vectors as tuples of arrays, one lane a case: XLA then compiles a long formula to one loop over the cases."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def about_axis(axis: Vector, sine: Float[Array, "..."], cosine: Float[Array, "..
 
 
 def smallest(values: Sequence[Array]) -> Float[Array, "..."]:
-    """The smallest of some arrays, case by case; NaN stays NaN."""
+    """The smallest of several arrays, case by case; NaN stays NaN."""
     minimum = values[0]
     for value in values[1:]:
         minimum = jnp.minimum(minimum, value)
@@ -71,7 +71,7 @@ def smallest(values: Sequence[Array]) -> Float[Array, "..."]:
 
 
 def largest(values: Sequence[Array]) -> Float[Array, "..."]:
-    """The largest of some arrays, case by case; NaN stays NaN."""
+    """The largest of several arrays, case by case; NaN stays NaN."""
     maximum = values[0]
     for value in values[1:]:
         maximum = jnp.maximum(maximum, value)
@@ -85,5 +85,5 @@ def smallest_of_each(arrays: Sequence[Array]) -> tuple[Float[Array, "..."], ...]
 
 
 def materialized(values: Any, one: Float[Array, ""] | None) -> Any:
-    """The same values, which XLA then computes only once."""
+    """The same values, divided by a runtime 1 so that XLA stores them instead of computing them again."""
     return values if one is None else jax.tree.map(lambda x: x / one, values)

@@ -1,6 +1,6 @@
-"""Several numbers in one array: for each array that it writes, XLA's CPU backend repeats all that several arrays share.
+"""Several numbers packed into one: for each output array, XLA's CPU backend repeats the computations that all share.
 
-An array of complex numbers holds two real numbers in float64, or four in float32.
+A complex number holds two real numbers in float64, or four in float32.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-# Rounding to float32 changes a number by this part of it; numbers above the largest become the largest.
+# Relative error of rounding to float32; numbers above the largest become the largest.
 SINGLE_ERROR = 2.0**-24
 LARGEST = float(np.finfo(np.float32).max)
 WIDTH = 4
@@ -22,7 +22,7 @@ def paired(values: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def parts(pairs: Sequence[Array]) -> list[Array]:
-    """Take apart the numbers that `paired` has packed."""
+    """Unpack the numbers that `paired` has packed."""
     return [part(x) for x in pairs for part in (jnp.real, jnp.imag)]
 
 
@@ -33,7 +33,7 @@ def packed(values: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def unpacked(fours: Sequence[Array]) -> list[Array]:
-    """Take apart the numbers that `packed` has packed."""
+    """Unpack the numbers that `packed` has packed."""
     return [x for both in parts(fours) for x in _halves(both)]
 
 

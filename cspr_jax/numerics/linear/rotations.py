@@ -51,7 +51,7 @@ def matrix(quaternion: Float[Array, "4"]) -> Float[Array, "3 3"]:
 
 
 def product(left: Float[Array, "4"], right: Float[Array, "4"]) -> Float[Array, "4"]:
-    """The product of two quaternions, (3.18): the right one is the first rotation."""
+    """The product of two quaternions, (3.18), of which the right one rotates first."""
     scalar = left[0] * right[0] - jnp.dot(left[1:], right[1:])
     vector = left[0] * right[1:] + right[0] * left[1:] + jnp.cross(left[1:], right[1:])
     return jnp.concatenate([scalar[None], vector])
@@ -70,5 +70,5 @@ def conjugate(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
 
 
 def upper(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
-    """Whichever of q and -q has an angle in [-pi, pi]: its scalar part is not negative, thesis section 3.7."""
+    """Of q and -q, the one with an angle in [-pi, pi], whose scalar part is not negative, thesis section 3.7."""
     return jnp.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)

@@ -1,1 +1,1 @@
-"""Minima: golden sections, constrained and evolutionary searches, and minima by halving blocks."""
+"""Searches for minima: by golden sections, with constraints, by evolution, and by halving blocks."""

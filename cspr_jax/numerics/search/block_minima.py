@@ -11,9 +11,9 @@ import numpy as np
 from cspr_jax.numerics.shapes import Float
 
 ROUNDS = 64
-# A bound and an attained value agree if they differ by no more than this fraction of the scale of the values.
+# A bound and an attained value agree if they differ by at most this fraction of the scale of the values.
 AGREED = 1e-12
-# Halving ends after this many blocks: the bounds that are proved by then are the answer.
+# Halving ends after this many blocks, with the bounds that are proved by then.
 MAX_BLOCKS = 2_000_000
 
 
@@ -21,7 +21,7 @@ class Proved(NamedTuple):
     """Smallest values of n cases, by group of functions.
 
     Fields:
-        attained: (n, n_groups) a value that is attained.
+        attained: (n, n_groups) smallest value found.
         bound: (n, n_groups) proved lower bound.
     """
 
@@ -30,13 +30,13 @@ class Proved(NamedTuple):
 
 
 class MinimumBlocks(NamedTuple):
-    """Parts of the intervals.
+    """Blocks: parts of the intervals.
 
     Fields:
         case: (n_blocks,) index of the case.
         piece: (n_blocks,) index of the piece of a piecewise function.
         start: (n_blocks,) start of each block.
-        width: (n_blocks,).
+        width: (n_blocks,) width of each block.
     """
 
     case: np.ndarray

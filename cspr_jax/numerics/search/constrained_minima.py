@@ -1,4 +1,4 @@
-"""Constrained minimum of a smooth objective: the best of many points are improved, and proved."""
+"""Constrained minimum of a smooth objective: the best of many points are improved, and the results proved feasible."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from cspr_jax.numerics.shapes import Float
 
 # A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
 Parts = Callable[[Any, Array], tuple[Array, Array]]
-SAMPLES = 4096  # points that are evaluated
-IMPROVED = 8  # of which the best are starts of a search
+SAMPLES = 4096  # number of points that are evaluated
+IMPROVED = 8  # number of the best points at which a local search starts
 BATCH = 512
-# Smallest margins that are required, one after the other, until the answer is proved.
+# Required margins, tried one after the other until the result is proved feasible.
 MARGINS = (1e-9, 1e-7, 1e-5, 1e-3)
 STEPS = 200
 AGREED = 1e-12
@@ -63,7 +63,7 @@ def constrained_minimum(
     high: Float[np.ndarray, "n"],
     verified: Callable[[np.ndarray], Verified],
 ) -> Float[np.ndarray, "n"]:
-    """Unknowns with the least objective among feasible ones: a local minimum, or the best of several."""
+    """Feasible unknowns with the smallest objective: the best of the local minima that are found."""
     from scipy.stats import qmc  # it takes a second to import
 
     fraction = qmc.Halton(len(low), seed=0).random(SAMPLES)
@@ -71,7 +71,7 @@ def constrained_minimum(
     value, margin = in_batches(partial(_screened, parts, arguments), points, batch_size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
-    # Feasible points come first, the smallest objective ahead; then the points that are nearest to being feasible.
+    # Feasible points come first, in the order of their objectives, then all others in the order of their violations.
     order = np.lexsort((np.where(margin > 0.0, value, -margin), margin <= 0.0))
     best, verdict = points[order[0]], verified(points[order[0]])
     objective = float(value[order[0]])

@@ -1,10 +1,10 @@
-"""Least value of an objective under smallest margins, for many questions at once: differential evolution.
+"""Differential evolution: smallest objective subject to required margins, for many problems at once.
 
 A fixed set of points is evaluated in groups, and the best of each group form a population. Each generation moves every
-member towards one of the best and along the difference of two others, and keeps the move if it is no worse: so steps
-shrink with the population, and follow the valleys in which it lies. Smallest margins have kinks, at which a search by
-gradients would get stuck. All questions use the same points and moves, so that answers are repeatable and do not depend
-on other questions.
+member towards one of the best and along the difference of two others, and keeps the move if it is no worse; so steps
+shrink with the population and follow the valleys in which it lies. The smallest of several margins has kinks, at which
+a search by gradients would get stuck. All problems use the same points and moves, so that results are repeatable and do
+not depend on other problems.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from jax import Array, lax
 from cspr_jax.numerics.batches import in_batches, in_parts
 from cspr_jax.numerics.shapes import Float
 
-# A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
-# margin ().
+# A function of arguments, one of `questions` and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the
+# smallest margin ().
 Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
-# These numbers have been chosen by measurements.
-GROUP = 64  # points of a group, the best of which becomes a member
-GENERATIONS = 2  # generations per member
-LED = 10  # members per leader
+# These numbers were chosen by measurement.
+GROUP = 64  # number of points of a group, the best of which becomes a member
+GENERATIONS = 2  # number of generations per member
+LED = 10  # number of members per leader, one of the best towards which members move
 STEPS = (0.4, 0.9)  # range of the lengths of steps
 CHANCE = 0.9  # probability that an unknown takes part in a step
-BATCH = 16  # questions
-PART = 256  # questions of a thread at a time
+BATCH = 16  # number of problems of a batch
+PART = 256  # number of problems that a thread takes at a time
 
 
 class Moves(NamedTuple):
     """Moves of all generations.
 
     Fields:
-        leader: (n_generations, n) number, among the best, of the member towards which each is moved.
-        first: (n_generations, n) number of the first member of the difference.
-        second: (n_generations, n) number of the second member of the difference.
+        leader: (n_generations, n) index, among the leaders, of the one towards which each member is moved.
+        first: (n_generations, n) index of the first member of the difference.
+        second: (n_generations, n) index of the second member of the difference.
         step: (n_generations, n, 1) length of the step.
         is_moved: (n_generations, n, d) mask of the unknowns that take part.
     """
@@ -53,10 +53,10 @@ class Moves(NamedTuple):
 
 
 def moves_of(unknowns: int, population: int) -> Moves:
-    """Moves, the same ones for all questions."""
+    """Moves, the same for all problems."""
     random = np.random.default_rng(0)
     shape = (GENERATIONS * population, population)
-    # A permutation and the same permutation rolled pair no member with itself.
+    # Pairing a permutation with itself, rolled by one, pairs no member with itself.
     first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
     is_moved = random.random((*shape, unknowns)) < CHANCE
     np.put_along_axis(is_moved, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
@@ -107,19 +107,19 @@ def _generation(
 
 
 def _rank(value: Array, margin: Array, threshold: Array) -> Array:
-    # Points with the margin first, by their objective; then the others, by their margin. The least is the best.
+    # Lower ranks are better: points with the required margin come first, by objective, then the others, by margin.
     return jnp.where(margin >= threshold, -1.0 - 1.0 / (1.0 + value), -margin)
 
 
 def evolved(
     parts: Parts, arguments: Any, questions: Any, *, unknowns: int, margins: tuple[float, ...], population: int
 ) -> Float[np.ndarray, "n n_margins d"]:
-    """Best points of many questions."""
+    """Best points of many problems, for each required margin."""
     from scipy.stats import qmc  # it takes a second to import
 
     points = qmc.Halton(unknowns, seed=0).random(GROUP * population)
     base_moves = moves_of(unknowns, population)
-    # Each search gets its own moves: one may find the point that another one misses.
+    # The search for each margin gets moves of its own, since one may find a point that another misses.
     moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(margins))]), base_moves)
     kernel = partial(_evolved, parts, arguments, np.asarray(margins), points, moves)
 

@@ -1,4 +1,4 @@
-"""Smallest values: golden sections of one function, and of many that may have kinks around their smallest samples."""
+"""Smallest values: of one function by golden sections, and of many with kinks by refinement around their samples."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from cspr_jax.numerics.shapes import Float, Int
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
-# Minima are refined around so many samples of each function, by so many points around each; the points of each round
-# are eight times as dense as before.
+# Minima are refined around STARTS samples of each function, by POINTS points around each; the points of each round are
+# eight times as dense as those of the round before.
 STARTS = 3
 POINTS = 17
 ROUNDS = 4
-# Distances of samples whose ratio is at least this tell the curvature of a function.
+# A second derivative can be estimated from three samples if the ratio of their distances is at least this.
 EVEN = 1e-6
-CLOSE = 1e-12  # between samples on both sides of a joint
+CLOSE = 1e-12  # distance of the two samples on both sides of a joint of pieces
 
 
 class Bracket(NamedTuple):
@@ -74,7 +74,7 @@ def vertex_values(
         earlier, later = rates[..., :-1, :], rates[..., 1:, :]
         square, rate = (later - earlier) / (before + after), (earlier * after + later * before) / (before + after)
         drop = rate**2 / (4.0 * square)
-    # The difference between both sides of a joint is a jump, and says nothing of derivatives.
+    # Functions may jump at a joint of pieces, so that differences across it tell nothing about derivatives.
     is_even = np.minimum(before, after) > EVEN * np.maximum(before, after)
     is_low = (earlier <= 0.0) & (later >= 0.0) & np.isfinite(drop) & is_even
     vertices[..., 1:-1, :] -= np.where(is_low, drop, 0.0)
@@ -84,7 +84,7 @@ def vertex_values(
 def lowest_samples(
     values: Float[np.ndarray, "... n n_functions"], estimates: Float[np.ndarray, "... n n_functions"], count: int
 ) -> Int[np.ndarray, "... count n_functions"]:
-    """Samples around which the smallest values are looked for: the smallest one, then minima by their estimates."""
+    """Samples around which to search for minima: the smallest sample, then local minima in the order of estimates."""
     earlier, later = np.array(values, float), np.array(values, float)
     earlier[..., 1:, :], earlier[..., :1, :] = values[..., :-1, :], np.inf
     later[..., :-1, :], later[..., -1:, :] = values[..., 1:, :], np.inf
@@ -96,14 +96,14 @@ def lowest_samples(
 def narrowed(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> Float[np.ndarray, "n_motions n_functions"]:
-    """Smallest value of each function along each of some motions."""
+    """Smallest value of each function along each motion."""
     return narrowed_times(function, tau, values)[0]
 
 
 def narrowed_times(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
-    """Smallest value of each function along each of several motions, and the time at which it is attained."""
+    """Smallest value of each function along each motion, and the time at which it is attained."""
     tau = np.broadcast_to(tau, values.shape[:2])
     starts = lowest_samples(values, vertex_values(tau, values), STARTS)
     return followed(function, tau, starts, ROUNDS)
@@ -116,17 +116,17 @@ def followed(
     rounds: int,
     n_followed: int = STARTS,
 ) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
-    """Smallest value of each function near some of its samples, and the time at which it is attained."""
+    """Smallest value of each function near the samples from which the search starts, and the time of it."""
     motion, column = np.arange(len(tau))[:, None, None], np.arange(starts.shape[2])
     centers, width = tau[motion, starts], _distances(tau)[motion, starts]
     for _ in range(rounds):
         points = np.clip(centers[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
-        # Around each start of a function only the values of this function count: (n_motions, n_starts, n_functions, n).
+        # Of the points around a start, keep only values of its own function: (n_motions, n_starts, n_functions, n).
         of_start = np.moveaxis(samples[:, :, column, :, column], 0, 2)
         lowest = of_start.min(3)
         centers = np.take_along_axis(points, of_start.argmin(3)[..., None], axis=3)[..., 0]
-        # NaN counts as the smallest value, as for NumPy.
+        # Treat NaN as the smallest value, as NumPy's minimum does.
         best = np.argsort(np.where(np.isnan(lowest), -np.inf, lowest), axis=1, kind="stable")[:, :n_followed]
         lowest, centers, width = (np.take_along_axis(table, best, axis=1) for table in (lowest, centers, width))
         width = 2.0 * width / (POINTS - 1)
