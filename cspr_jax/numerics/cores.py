@@ -31,7 +31,7 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
         controllers, _, group = rest.partition(":")
         if controllers and "cpu" not in controllers.split(","):
             continue
-        # In a container the path may be the host's, of which only the last parts, or none, exist below the mounted folder.
+        # In a container the path may be the host's, of which only the last parts, or none, exist in the mounted folder.
         # Version 1 has a folder for its controllers; where both versions are in use, version 2 has a folder of its own.
         for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
             path = PurePosixPath(group.lstrip("/"))

@@ -82,8 +82,8 @@ def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
     """Bounds of sin(pi f) and cos(pi f)."""
     f = flat(f)
     sine, cosine = elementary.sincospi(f.middle)
-    # At a distance d from the middle m, sin(m + d) = sin m cos d + cos m sin d; cos d is from 1 - d^2 / 2 to 1, and sin d
-    # within |d|^3 / 6 of d.
+    # At a distance d from the middle m, sin(m + d) = sin m cos d + cos m sin d; cos d is from 1 - d^2 / 2 to 1, and
+    # sin d within |d|^3 / 6 of d.
     half_range, half = math.pi * f.half_range(), (0.5 * math.pi * f.half_range()) ** 2
 
     def one(value: Array, derivative: Array) -> AffineBounds:
