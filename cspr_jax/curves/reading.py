@@ -26,7 +26,7 @@ from cspr_jax.numerics.linear import rotations
 PIECES_ERROR = 1e-6  # of the gap where two pieces meet
 WINDOWS_ERROR = 1e-9  # of the gap where two windows meet
 COEFFICIENT_ERROR = 1e-12  # of the rounding of coefficients
-# What the columns of a curve are, by their number: indices of x, y, z and the quaternion.
+# Meaning of a curve's columns, by their number: indices of x, y, z and the quaternion.
 _WIDTHS = {2: (0, 2), 3: (0, 1, 2), 7: (0, 1, 2, 3, 4, 5, 6)}
 
 

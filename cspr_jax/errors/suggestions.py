@@ -89,7 +89,7 @@ def did_you_mean(text: str, allowed: Iterable[str]) -> str:
 
 
 def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
-    """What an error message asks for in place of a name: the one that was probably meant, then all of them."""
+    """Names that an error message offers: the one that was probably meant, then all of them."""
     names = list(names)
     allowed = allowed or f"one of {', '.join(names)}"
     question = did_you_mean(value, names) if isinstance(value, str) else ""

@@ -1,1 +1,1 @@
-"""Robots: what they are, their statics, tensions and contacts at one state, and bounds of these over blocks."""
+"""Robots: models, statics, tensions and contacts in one state, and bounds of these over blocks of time."""

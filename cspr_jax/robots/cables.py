@@ -1,4 +1,4 @@
-"""Cables of any robot: diameters and pulleys; tensions, lengths and rates, by the balance of its kind."""
+"""Cables of any robot: diameters and pulleys; tensions, lengths and rates, with the balance of its kind of robot."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def with_cables(
 def tensions(
     robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED
 ) -> Float[Array, "n_cables"]:
-    """Cable tensions; where cables are redundant, the tensions that a rule chooses."""
+    """Cable tensions; those of redundant cables are chosen by a rule."""
     if robot.n_cables > robot.dof:
         return shared(robot, state, limits, rule).tensions
     if robot.pulleys is not None or robot.pattern not in MOVED:
@@ -91,7 +91,7 @@ def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribu
 
 
 def wrench_units(robot: AnyRobot) -> Float[Array, "dof"]:
-    """Divisors that make components of wrenches comparable: 1 of forces, the platform's radius of moments."""
+    """Divisors that make components of wrenches comparable: 1 for forces, the platform's radius for moments."""
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)

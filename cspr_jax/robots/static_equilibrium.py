@@ -1,4 +1,4 @@
-"""Tell whether a robot on any number of cables can hang at rest, all of them taut: single poses by a linear program."""
+"""Test whether a robot on any number of cables can hang at rest with all of them taut, by linear programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPTHS = np.linspace(-0.95, 1.0, 40)
 
 
 def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
-    """Reason why a robot cannot hang still with every cable taut, whatever its tensions."""
+    """Reason why no tensions hold a robot at rest with every cable taut; None where it can hang."""
     distance = float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean())
     low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
     high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)
@@ -36,6 +36,6 @@ def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
 
 @jax.jit
 def _balance(robot: AnyRobot, position: Float[Array, "3"]) -> tuple[Float[Array, "dof n_cables"], Float[Array, "dof"]]:
-    # Return the wrench matrix of a pose at rest, and the wrench that its cables must supply.
+    # Wrench matrix of a pose at rest, and the wrench that its cables must supply.
     rest = at_rest(position, jnp.eye(3))
     return robot.wrench_matrix(rest), robot.inertial_wrench(rest)

@@ -16,7 +16,7 @@ from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 
 _UNITS = {20: 0.0254, 21: 0.001}
 _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)
-# Of each plane: index of the normal axis, and the letters of positions and of centres in the order of positive turns.
+# For each plane: index of the normal axis, and letters of positions and of centres in the order of positive turns.
 _PLANES = {17: (2, "XY", "IJ"), 18: (1, "ZX", "KI"), 19: (0, "YZ", "JK")}
 MINUTE = 60.0  # s
 # Largest number of words that a message names, and of decimals that count.

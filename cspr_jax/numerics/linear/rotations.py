@@ -70,5 +70,5 @@ def conjugate(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
 
 
 def upper(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
-    """Of q and -q, the one with an angle in [-pi, pi], whose scalar part is not negative, thesis section 3.7."""
+    """The one of q and -q whose angle is in [-pi, pi]: its scalar part is not negative, thesis section 3.7."""
     return jnp.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)

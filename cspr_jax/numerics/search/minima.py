@@ -122,7 +122,7 @@ def followed(
     for _ in range(rounds):
         points = np.clip(centers[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
-        # Of the points around a start, keep only values of its own function: (n_motions, n_starts, n_functions, n).
+        # Around each start keep only the values of its own function: (n_motions, n_starts, n_functions, n).
         of_start = np.moveaxis(samples[:, :, column, :, column], 0, 2)
         lowest = of_start.min(3)
         centers = np.take_along_axis(points, of_start.argmin(3)[..., None], axis=3)[..., 0]

@@ -1,16 +1,16 @@
 """Bounds of clearances over a block of time: cables from each other, from obstacles and from their platform.
 
-Contacts are those of `robots.contacts.clearance.Scene`. Where no shape of a rigid platform is known and its points lie
-in a plane, the criterion of the thesis (section 3.10.2) takes its place: cables may not pass over the platform's face,
-from whose corner they must be separated. Its clearance is the distance of the spool, as the platform sees it, from the
-sector of the corner, which it may touch at isolated times only.
+Contacts are those of `robots.contacts.clearance.Scene`. A rigid platform whose shape is not known, but whose points lie
+in a plane, must meet the criterion of the thesis (section 3.10.2) instead: no cable may pass over the platform's face,
+into the sector of the corner to which it is attached. The clearance is then the distance of the spool, in platform
+axes, from this sector, which may vanish at isolated times only.
 
-Clearances are signed: where solid bodies meet they are minus the least translation that parts them, and at least
-minus `Bodies.deepest`. Cables without thickness, and cables and sectors, meet at isolated times only, at which the
-clearance is 0. That they pass through each other is proved where the volume that they span (the height of the cable
-over the face) has opposite signs at both ends of a block, while their lines are nearest to each other inside of both
-cables (the cable is over the sector) all the time: `passings`. Cables of a planar platform lie in one plane, so that
-they may cross for some time; they count as `Bodies.deepest` deep then.
+Clearances are signed: where solid bodies overlap they are minus the smallest translation that separates them, but not
+below minus `Bodies.deepest`. Cables without thickness, and cables and sectors, meet at isolated times only, at which
+the clearance is 0. `passings` proves that they pass through each other: the volume that they span (the height of the
+cable over the face) has opposite signs at both ends of a block, while throughout the block their lines are nearest to
+each other inside of both cables (the cable is over the sector). Cables of a planar platform lie in one plane, so that
+they may cross for some time; their clearance is then minus `Bodies.deepest`.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from cspr_jax.robots.contacts.convex_gaps import (
 from cspr_jax.robots.contacts.interference_lanes import residual
 from cspr_jax.robots.model.patterns import PATTERNS
 
-CORNER_ERROR = 1e-14  # rounding of the corners of shapes, over the extent of a scene
-POLAR = 1e-12  # cosines up to which directions point away from a sector
+CORNER_ERROR = 1e-14  # rounding error of the corners of shapes, over the extent of a scene
+POLAR = 1e-12  # largest cosine with a sector's directions of a direction that points away from the sector
 
 Range = tuple[Array, Array]
 
 
 def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Range:
-    """Bounds of clearances between surfaces, over one block."""
+    """Bounds of the clearances of all contacts, over one block."""
     ends, parts = _ends(state, cables), []
     if len(bodies.pairs):
         parts.append(_of_pairs(robot, bodies, ends))
@@ -86,7 +86,7 @@ def corner_depths(corners: Float[Array, "n_corners 3"], state: StateBounds) -> A
 
 
 def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:
-    # Points at which the cables leave, and those at which they are attached, (n_cables, 2, 3).
+    # Ends of the cables: points at which they leave, and attachment points, (n_cables, 2, 3).
     attached = state.position.each(lambda x: jnp.broadcast_to(x, cables.exit.middle.shape))
     attached = attached if cables.arm is None else attached + cables.arm
     return stacked([cables.exit, attached], axis=1)
@@ -110,7 +110,7 @@ def _of_pairs(robot: AnyRobot, bodies: Bodies, ends: AffineBounds) -> Range:
 
 
 def _cross_in_plane(first: AffineBounds, second: AffineBounds) -> Array:
-    # Tell whether segments (2, 3) in the plane y = 0 cross throughout: the ends of each are on two sides of the other.
+    # Tell whether segments (2, 3) in the plane y = 0 cross throughout: each line separates the ends of the other one.
     def parted(line: AffineBounds, points: AffineBounds) -> Array:
         start = line.each(lambda x: x[:1])
         ray, rays = line.each(lambda x: x[1:]) - start, points - start
@@ -154,13 +154,13 @@ def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableB
         return _signed(bodies, cable, shape, depth_bound(cable, body.planes))
 
     low, high = jax.vmap(one)(starts, spools)
-    # A cable that may be as short as the part that is left out is not checked.
+    # A cable that may be no longer than the part that is left out has no bounds.
     is_long = cables.length.low() > bodies.leave
     return jnp.where(is_long, low, -bodies.deepest) - bodies.radii, jnp.where(is_long, high, jnp.inf) - bodies.radii
 
 
 def _inward(state: StateBounds, points: AffineBounds) -> AffineBounds:
-    # Points (n, 3) in the axes of the platform, from the mass centre.
+    # Transform points (n, 3) to platform axes, with the mass centre as origin.
     return rotated(state.rotation.each(lambda x: x.T[None]), points - state.position.each(lambda x: x[None]))
 
 
@@ -188,7 +188,7 @@ def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) ->
 
 def _from_sector(sides: Array, normal: Array, cable: AffineBounds) -> Range:
     # Bound the distance of the end of a cable (3,), seen from its corner, from the sector of the corner. A direction
-    # that points away from the sector has no positive component along its sides, and along the direction between them.
+    # points away from the sector if no component along the sides, or along the middle between them, is positive.
     def off(seen: Array) -> Array:
         parts = residual((tuple(sides[0]), tuple(sides[1])), tuple(normal), tuple(seen))
         return jnp.stack(parts)
@@ -215,7 +215,7 @@ def _pass(first: AffineBounds, second: AffineBounds) -> Array:
     square = norm_squared(normal)
     is_inside = square.low() > 0.0
     for ray in (v, u):
-        # Fraction of a cable at which the lines are nearest, times the square of the normal.
+        # Fraction of a cable at which the lines are nearest, times the squared length of the normal.
         fraction = dot(cross(between, ray), normal)
         is_inside &= (fraction.low() > 0.0) & ((square - fraction).low() > 0.0)
     return is_inside & changes_sign(dot(between, normal))

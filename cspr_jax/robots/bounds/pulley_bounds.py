@@ -20,10 +20,10 @@ class PulleyBounds(NamedTuple):
 
     Fields:
         direction: (n_cables, 3) unit vectors of the free cables, towards the effector.
-        exit: (n_cables, 3) points at which the cables leave, from the entry points, m.
-        length: (n_cables,) with what lies on the pulleys, m.
-        inverse: (n_cables,) 1 over the free length, 1/m.
-        swivel: (n_cables,) r (1 - t . k) (p . v)^2 / w of `robots.statics.cable_lengths`, m^2/s^2.
+        exit: (n_cables, 3) points at which the cables leave, relative to the entry points, m.
+        length: (n_cables,) lengths, including the arcs on the pulleys, m.
+        inverse: (n_cables,) 1 over the free lengths, 1/m.
+        swivel: (n_cables,) the term r (1 - t . k) (p . v)^2 / w of `robots.statics.cable_lengths`, m^2/s^2.
     """
 
     direction: AffineBounds
@@ -51,7 +51,7 @@ def pulley_bounds(pulleys: Pulleys, ray: AffineBounds, velocity: AffineBounds) -
     direction = side * _wide(sine) + _wide(cosine) * axes
     # A + r e + r n, with n = -(t . k) e + (t . e) k.
     exits = side * _wide((1.0 - cosine) * radius) + _wide(sine * radius) * axes
-    # Speed across the plane of the pulley, with the distance from the swivel axis.
+    # Speed normal to the plane of the pulley; `across` is as long as the distance from the swivel axis.
     speed = dot(across, velocity) * narrow
     swivel = (1.0 - cosine) * squared(speed) * narrow * radius
     return PulleyBounds(direction, exits, _wrapped(radius, x, z, sine, cosine) + free, inverse, swivel)
@@ -62,11 +62,11 @@ def _wide(bounds: AffineBounds) -> AffineBounds:
 
 
 def _wrapped(radius, x: AffineBounds, z: AffineBounds, sine: AffineBounds, cosine: AffineBounds) -> AffineBounds:
-    # Bound the length on pulleys, by the angle between the direction and that in the middle, as `pulleys.exits` has it.
+    # Bound the length on pulleys by the angle between the direction and that in the middle; see `pulleys.exits`.
     around = jnp.arctan2(z.middle, -x.middle)
     around = jnp.where(z.middle < 0.0, around + 2.0 * jnp.pi, around)
     free = jnp.sqrt(jnp.maximum(x.middle**2 + z.middle**2 - radius**2, 0.0))
     middle = around - jnp.arctan2(free, radius)
-    # Rounding of the sine and the cosine of the angle in the middle.
+    # Sine and cosine of the angle in the middle, with their rounding errors.
     parts = [AffineBounds(f, jnp.zeros_like(f), jnp.full_like(f, ROUNDING)) for f in (jnp.sin(middle), jnp.cos(middle))]
     return (arc_sine(sine * parts[1] - cosine * parts[0]) + middle) * radius

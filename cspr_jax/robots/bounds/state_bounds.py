@@ -1,4 +1,4 @@
-"""Bounds of states over a block of time, and of what follows from them: lengths of cables, their rates, the balance.
+"""Bounds of states over a block of time, and of lengths of cables, their rates and the wrench balance.
 
 Formulas are those of `robots.statics.force_balance`, `robots.statics.wrench_balance` and `robots.model.platform`, in
 affine bounds.
@@ -43,7 +43,7 @@ class StateBounds(NamedTuple):
     position: AffineBounds
     velocity: AffineBounds
     acceleration: AffineBounds
-    # As of states.
+    # Typed as arrays are in `State`: platforms always have them.
     rotation: AffineBounds = None  # type: ignore[assignment]
     angular_velocity: AffineBounds = None  # type: ignore[assignment]
     angular_acceleration: AffineBounds = None  # type: ignore[assignment]
@@ -102,7 +102,7 @@ def attachments(
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
-    """Bounds of the cables, also behind pulleys."""
+    """Bounds of the cables, with or without pulleys."""
     arm, target, velocity, point_acceleration = attachments(robot, state)
     ray = target + -robot.base_points
     square = norm_squared(ray)
@@ -129,7 +129,7 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
 
 
 def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:
-    """Bounds of the wrench balance: wrenches of unit tensions, and what the cables must supply."""
+    """Bounds of the wrench balance: wrenches of unit tensions, and the wrench that the cables must supply."""
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     row = PATTERNS[robot.pattern]
     forces = cables.direction.each(jnp.transpose)
@@ -150,7 +150,7 @@ def _expanded(bounds: AffineBounds) -> AffineBounds:
 
 
 def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
-    # Rate of the angular momentum, in platform axes, where the inertia is constant, and rotated back.
+    # Rate of the angular momentum: computed in platform axes, in which the inertia is constant, then rotated back.
     inertia = robot.inertia
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         arm = jnp.asarray(robot.centre_of_mass)
@@ -174,5 +174,5 @@ def balanced_part(
 
 
 def _products(rows: AffineBounds, columns: AffineBounds) -> AffineBounds:
-    # (m, 3) times (3, n).
+    # Product of (m, 3) and (3, n).
     return dot(rows.each(lambda x: x[:, None]), columns.each(lambda x: x.T[None]))

@@ -1,18 +1,19 @@
-"""Tensions of all robots within an uncertainty, over a block of time, by how far they are from the planned robot's.
+"""Tensions of all robots within an uncertainty, over a block of time, by their distance from the planned tensions.
 
-Another robot's spool j moves ray j, of length l_j. A part of that along the ray only scales it; across it the unit
-vector u_j gains a vector eps_j that is no longer than t_j. With tensions phi_j at unit vectors u_j + eps_j, which are
-those of the cables over sqrt(1 + eps_j^2), A the planned matrix, f tensions that balance the planned robot, and B a
-right inverse of A in the middle of the block, phi = f + d balances the other robot where
+Displacing spool j displaces ray j, of length l_j. The component along the ray only scales it; the component across
+adds to the unit vector u_j a vector eps_j that is no longer than t_j. Let phi_j be the tensions at vectors
+u_j + eps_j, which are tensions of the cables over sqrt(1 + eps_j^2), A the planned matrix, f tensions that balance the
+planned robot, and B a right inverse of A in the middle of the block. Then phi = f + d balances the other robot where
 
     d = B (delta w - (A' - A) f) - B (A' - A_c) d,    so |d| <= b + (G + D) |d|,    b = |B delta w| + D |f|,
 
-component by component: G bounds B (A - A_c), and D_kj = |part of g_kj across u_j| t_j, g_kj being the change of row k
-of B A with ray j. Where x >= b + (G + D) x for some x > 0 the spectral radius of G + D is below 1; then there is such a
-d, |d| <= x, and A' has full rank. Cauchy's inequality bounds B delta w for a displaced mass centre.
+component by component: A' is the matrix of the other robot and A_c that of the planned robot in the middle of the
+block, G bounds B (A - A_c), and D_kj = |part of g_kj across u_j| t_j, where g_kj is the derivative of row k of B A with
+respect to ray j. Where x >= b + (G + D) x for some x > 0 the spectral radius of G + D is below 1; then such a d exists
+with |d| <= x, and A' has full rank. Cauchy's inequality bounds B delta w for a displaced mass centre.
 
-On as many cables as components a closer bound follows from there (docs/theory.md): until a first tension k reaches its
-smallest value, d_k is made of the sum of D_kj phi_j, which is at most y w' for every y with y A' >= D_k.
+With as many cables as components a closer bound follows (docs/theory.md): until a first tension k reaches its smallest
+value, d_k is bounded by the sum of D_kj phi_j, which is at most y w' for every y with y A' >= D_k.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# Surplus of a solution, and smallest change of tensions, over the largest of them.
+# Relative surplus by which solutions of inequalities are enlarged, so that they hold in spite of rounding.
 SURPLUS = 1e-9
-# Rounds in which functionals are corrected, and the relative surplus of each correction.
+# Number of rounds in which the functionals y are corrected.
 ROUNDS = 8
 SPARE = 0.01
 
@@ -52,7 +53,7 @@ class UncertainTensions(NamedTuple):
 
 
 def with_mass(robot: AnyRobot, ratio: Float[Array, ""]) -> AnyRobot:
-    """A robot whose mass is another one, its inertia in proportion."""
+    """The robot with its mass and inertia multiplied by a ratio."""
     if isinstance(robot, PlatformRobot):
         return dataclasses.replace(robot, mass=robot.mass * ratio, inertia=robot.inertia * ratio)
     return dataclasses.replace(robot, mass=robot.mass * ratio)
@@ -65,7 +66,7 @@ def uncertain_tensions(
     limits: tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]],
     radii: tuple[Float[Array, ""], Float[Array, ""]],
 ) -> UncertainTensions:
-    """Tensions of all robots that differ from one by positions of spools and of the mass centre."""
+    """Tensions of all robots that differ from a given one in positions of the spools and of the mass centre."""
     unit = 1.0 / wrench_units(robot)
     matrix, wrench = balance_bounds(robot, state, cables)
     matrix, wrench = matrix * unit[:, None], wrench * unit
@@ -83,15 +84,15 @@ def uncertain_tensions(
         down, up = jnp.fmin(maximum, down), jnp.fmin(maximum, up)
     low, high = tensions.low() - down, tensions.high() + up
     is_known = jnp.isfinite(low).all() & jnp.isfinite(high).all()
-    # A tension at a tilted unit vector is that of its cable over the length of the vector, at least 1.
+    # Tensions at tilted unit vectors are tensions of the cables over the lengths of these vectors, at least 1.
     norms = jnp.sqrt(1.0 + tilt**2)
     low = jnp.where(low < 0.0, low * norms, low)
     return UncertainTensions(jnp.where(is_known, low, -jnp.inf), jnp.where(is_known, high * norms, jnp.inf))
 
 
 class _UnitBlock(NamedTuple):
-    # A right inverse (n_cables, dof) of the matrix in the middle; bounds of the matrix, of its changes with unit
-    # vectors across cables (dof, n_cables, 3), and of the planned tensions; tilts (n_cables,).
+    # Right inverse (n_cables, dof) of the matrix in the middle; bounds of the matrix, of its derivatives with respect
+    # to unit vectors, across cables (dof, n_cables, 3), and of the planned tensions; tilts (n_cables,).
     inverse: Array
     matrix: AffineBounds
     across: AffineBounds
@@ -99,7 +100,7 @@ class _UnitBlock(NamedTuple):
     tensions: AffineBounds
 
     def changes(self, rows: Array) -> tuple[Array, Array]:
-        # Bound what rows (m, dof) times the matrix change within the block, and with displaced spools, (m, n_cables).
+        # Bound changes of rows (m, dof) times the matrix, within the block and with displaced spools, (m, n_cables).
         dof, count = self.matrix.middle.shape
         left = jnp.abs(self.matrix.middle @ self.inverse - jnp.eye(dof))
         rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
@@ -110,7 +111,7 @@ class _UnitBlock(NamedTuple):
 
 
 def _closer(block: _UnitBlock, displaced: Array, rest: Array, minimum: Array, centre: Array) -> tuple[Array, Array]:
-    # Bound how much each tension falls and rises, (n_cables,); NaN where one might fall below the smallest tension.
+    # Bound decrease and increase of each tension, (n_cables,); NaN where a tension may fall below its smallest value.
     diagonal = jnp.diagonal(displaced)
     less, up = _largest_sum(block, jnp.stack([displaced - jnp.diag(diagonal), displaced]), centre)
     down, up = less + diagonal * minimum + rest, up + rest
@@ -119,7 +120,7 @@ def _closer(block: _UnitBlock, displaced: Array, rest: Array, minimum: Array, ce
 
 
 def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
-    # Bound sums of tensions of any robot, none below 0, times rows of weights, (2, n_cables); NaN: no bound is known.
+    # Bound weighted sums of the tensions, none below 0, of any robot within the uncertainty; NaN: no bound was found.
     shape, weights = weights.shape[:2], weights.reshape(-1, weights.shape[2])
     high, floor = block.tensions.high(), SURPLUS * jnp.max(weights, axis=1, keepdims=True)
 
@@ -142,7 +143,7 @@ def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Float[Array, "3"]
 
 
 def _across(robot: AnyRobot, state: StateBounds, cables: CableBounds, unit: Array) -> AffineBounds:
-    # Changes of the wrenches of unit tensions with their unit vectors, across these, (dof, n_cables, 3).
+    # Derivatives of the wrenches of unit tensions with respect to unit vectors, across these, (dof, n_cables, 3).
     units = jnp.tile(jnp.eye(3), (robot.n_cables, 1))
     forces = constant(units.T)
     if isinstance(robot, PlatformRobot) and cables.arm is not None:
@@ -159,14 +160,14 @@ def _across(robot: AnyRobot, state: StateBounds, cables: CableBounds, unit: Arra
 def _wrench_of(
     robot: PlatformRobot, state: StateBounds, force: AffineBounds | None, moment: AffineBounds
 ) -> AffineBounds:
-    # Components of one force and moment (3,) that the cables balance, (dof,).
+    # Components (dof,) that the cables balance, of a force and a moment (3,).
     force = constant(jnp.zeros(3)) if force is None else force
     parts = (bounds.each(lambda x: x[:, None]) for bounds in (force, moment))
     return balanced_part(robot, state.rotation, *parts).each(lambda x: x[:, 0])
 
 
 def _acceleration_matrix(state: StateBounds) -> AffineBounds:
-    # Maps points of the platform to their relative accelerations, (3, 3).
+    # Matrix (3, 3) from points of the platform to their accelerations relative to the mass centre.
     axes = constant(jnp.eye(3))
     rate, acceleration = (
         bounds.each(lambda x: x[None]) for bounds in (state.angular_velocity, state.angular_acceleration)
@@ -175,7 +176,7 @@ def _acceleration_matrix(state: StateBounds) -> AffineBounds:
 
 
 def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
-    # Effect of a displaced mass centre on the wrench, to first order, (dof, 3) per length.
+    # Derivative (dof, 3) of the wrench with respect to the position of the mass centre.
     acceleration_matrix, axes = _acceleration_matrix(state) * robot.mass, constant(jnp.eye(3))
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     moment: AffineBounds | None = None
@@ -189,7 +190,7 @@ def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
 
 
 def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, radius: Array) -> Array:
-    # Bound what a displaced mass centre changes of tensions, (n_cables,) N.
+    # Bound the changes of tensions, (n_cables,) N, by a displaced mass centre.
     if not isinstance(robot, PlatformRobot):
         return jnp.zeros(robot.n_cables)
     influence = _centre_influence(robot, state).each(lambda x: x.T[None])
@@ -200,7 +201,7 @@ def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, radius: 
 
 
 def _solution(matrix: Array, right: Array) -> Array:
-    # Find x with x >= matrix x + right, all of them positive; NaN without.
+    # Find a positive x with x >= matrix x + right; NaN where there is none.
     x = solved(jnp.eye(len(right)) - matrix, right[:, None])[0][:, 0] * (1.0 + SURPLUS)
     holds = (x > 0.0).all() & (right > 0.0).all() & (matrix @ x + right <= x).all()
     return jnp.where(holds, x, jnp.nan)

@@ -1,16 +1,16 @@
-"""Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
+"""Witness tensions: tensions that balance a motion throughout a block of time, and bounds of their largest margin.
 
-A line f + s f' of tensions, whose coefficients are corrected by the balance and its derivative, leaves a residual
-r(s) of second order; a parabola, beside bounds of the balance around parabolas, leaves one of third order. For any B
-with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the rows of |E| sum to less than 1 it
-is bounded. Where the bounds keep the limits, there are tensions within them at all times: a proof. On as many
-cables as components these are the only ones, and A is nowhere singular.
+A line f + s f' of tensions that meets the balance and its derivative in the middle leaves a residual r(s) of second
+order; with bounds around parabolas, a parabola leaves one of third order. For any B with A(s) B = 1 + E(s), the
+correction B (1 + E)^-1 r makes the balance exact, and it is bounded where the rows of |E| sum to less than 1. Where the
+bounds keep the limits, feasible tensions are proved to exist at all times. With as many cables as components these
+tensions are the only ones, and A is nowhere singular.
 
-For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
-about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes.
-With y(s) normal to the d - 1 columns that span it (found in the same way, as a solution of a balance), tensions that
-are r from their limits give at most y w >= sum of y A_i times the limit on the other side, and r sum |y A_i|: that
-bounds r from above.
+With more cables, the line joins the most central tensions at both ends of the block: between the ends tensions are at
+least about as far from their limits, even where another face becomes the nearest one. A face of the set of wrenches
+refutes feasibility: let y(s) be normal to the d - 1 columns that span the face (found in the same way, as a solution of
+a balance). If all tensions keep a distance r from their limits, y w is at least the sum of y A_i times the limits that
+make it smallest, plus r sum |y A_i|: that bounds r from above.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class WitnessTensions(NamedTuple):
 
     Fields:
         tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN without bounds.
-        below: (2,) at start and end of the block, a line below the largest distance of tensions from their limits, N;
-            -inf where nothing is known.
-        above: (2,) likewise a line above it; inf where nothing is known.
+        below: (2,) values, at both ends of the block, of a line below the largest distance of tensions from their
+            limits, N; -inf without a bound.
+        above: (2,) likewise for a line above the largest distance; inf without a bound.
         is_regular: () whether the matrix is proved to have full rank throughout.
         inverse: (n_cables, dof) right inverse of the matrix in the middle.
     """
@@ -53,7 +53,7 @@ class WitnessTensions(NamedTuple):
 
     @property
     def margin_high(self) -> Array:
-        """Upper bound of the same."""
+        """Upper bound of the largest distance of tensions from their limits, at all times, N."""
         return self.above.max(-1)
 
 
@@ -82,7 +82,7 @@ def witness_tensions(
         minimum = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
         below = jnp.broadcast_to(jnp.where(is_regular, minimum, -jnp.inf), (2,))
         return WitnessTensions(tension, below, above, is_regular, inverse)
-    # The smallest of functions above lines is above the line between the smallest values at both ends.
+    # The minimum of several lines is a concave function, above the line between its values at both ends.
     lines = tension.middle - tension.linear, tension.middle + tension.linear
     slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
     below = jnp.stack([jnp.min(slack) for slack in slacks])
@@ -91,7 +91,7 @@ def witness_tensions(
 
 def _central_inverse(matrix: Array, face: NearestFace, other: Array) -> Array:
     # Right inverse with which tensions stay the most central ones near one face: all cables that do not span it move
-    # away from their limits by the same. Another one where the cables of the face depend on each other.
+    # away from their limits by the same amount. Return `other` where the cables of the face are linearly dependent.
     dof, count = matrix.shape
     signs = jnp.sign(face.along)
     system = jnp.concatenate([matrix[:, face.columns], (matrix @ signs)[:, None]], axis=1)
@@ -112,12 +112,12 @@ def _solution(
     matrix: AffineBounds, inverse: Array, right: AffineBounds, start: Array, rise: Array
 ) -> tuple[AffineBounds, Array]:
     # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start` that rises by `rise`,
-    # (n,); say whether M, with this right inverse in the middle, is proved to have rank m throughout.
+    # (n,); tell whether M, with this right inverse in the middle, is proved to have rank m throughout.
     m, n = matrix.middle.shape
     middle = start + inverse @ (right.middle - matrix.middle @ start)
     linear = rise + inverse @ (right.linear - matrix.linear @ middle - matrix.middle @ rise)
     line = AffineBounds(middle, linear, jnp.zeros(n))
-    # Sums of rows of |M B - 1|; that of the middle is rounding.
+    # Sums of the rows of |M B - 1|; in the middle only rounding errors contribute.
     sums = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.linear @ inverse)
     if matrix.square is not None:
         line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.linear @ linear))
@@ -133,15 +133,14 @@ def _solution(
 def _face_margin(
     matrix: AffineBounds, inverse: Array, wrench: AffineBounds, limits: tuple[Array, Array], face: NearestFace
 ) -> Array:
-    # Values at start and end of a line above the largest distance from the limits, by the face that is nearest in the
-    # middle.
+    # Values at both ends of a line above the largest distance from the limits, by the face nearest in the middle.
     dof, count = matrix.middle.shape
     columns, (low, high) = face.columns, limits
     across, nothing = matrix.each(lambda x: x[:, columns].T), constant(jnp.zeros(dof - 1))
     normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse, jnp.zeros(dof))
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
     along = rotated(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
-    # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
+    # Take each cable at the limit with the smaller product; the other limit counts if the product may change its sign.
     is_inward = along.middle > 0.0
     limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))
     is_bounded = jnp.isfinite(limit) | (along.magnitude() == 0.0)

@@ -1,7 +1,7 @@
-"""Clearance of many poses: how far cables are from each other, from obstacles and from their own platform, signed.
+"""Clearance of many poses: signed distances of cables from each other, from obstacles and from their own platform.
 
-Coordinates are those of the given robot, and shapes have the same axes; the shape of the platform has platform axes,
-from the mass centre. Every kind of contact in a scene has a kernel of `clearance_kernels`, compiled once a robot.
+Obstacles are in the axes of the robot; the shape of the platform is in platform axes, with the mass centre as origin.
+Every kind of contact in a scene has a kernel of `clearance_kernels`, compiled once for each robot.
 """
 
 import dataclasses
@@ -20,16 +20,16 @@ from cspr_jax.robots.model.platform import PlatformRobot, separate_pairs
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, hull, is_flat
 
-# Poses of a batch on a CPU; rates are about the same from 16384 to 131072.
+# Number of poses of a batch on a CPU; rates are about the same from 16384 to 131072.
 BATCH = 65_536
-# Few poses are computed in a batch of this length: a search asks for some at a time.
+# Batch length for few poses, such as those of one step of a search.
 FEW = 4096
-# Contacts with the platform do not count on the end of a cable next to its attachment point: so many diameters of it,
+# Length of a cable next to its attachment point on which contacts with the platform do not count: this many diameters,
 # or this fraction of the extent of the platform's shape.
 LEAVE_DIAMETERS = 10.0
 LEAVE_FRACTION = 0.01
-# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest
-# value that was met is 2.2.
+# Rounding error of a clearance over machine epsilon times the largest coordinate of pose, robot and obstacles; the
+# largest value in tests was 2.2.
 EPSILONS = 16.0
 
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
@@ -41,8 +41,8 @@ class ContactPair(NamedTuple):
     Fields:
         kind: "cables": two cables; "obstacle": a cable and an obstacle; "platform": a cable and its own platform;
             "platform-obstacle": the platform and an obstacle.
-        cable: number of the cable, the first of two, from 0 on; -1 for the platform.
-        other: number of the other cable or of the obstacle, from 0 on; -1 for the platform.
+        cable: index of the cable, of two cables the first; -1 for the platform.
+        other: index of the other cable or of the obstacle; -1 for the platform.
     """
 
     kind: Kind
@@ -52,7 +52,7 @@ class ContactPair(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A robot among the bodies that its cables can meet.
+    """A robot among the bodies with which its cables can collide.
 
     Fields:
         base_points: (n_cables, 3) m.
@@ -60,8 +60,8 @@ class Scene:
         diameters: (n_cables,) m.
         pairs: cables that share neither spool nor platform point.
         obstacles: shapes fixed in space.
-        body: shape of the platform in its axes, from the mass centre; None: the platform does not count.
-        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m.
+        body: shape of the platform in its axes, from the mass centre; None: contacts with the platform do not count.
+        leave: length of each cable next to its attachment point on which contacts with the platform do not count, m.
     """
 
     base_points: np.ndarray
@@ -74,7 +74,7 @@ class Scene:
 
     @property
     def contact_pairs(self) -> tuple[ContactPair, ...]:
-        """Pairs of bodies that `Clearances.nearest` counts."""
+        """Pairs of bodies to which `Clearances.nearest` refers by index."""
         cables = range(len(self.base_points))
         pairs_of_bodies = [ContactPair("cables", i, j) for i, j in self.pairs]
         pairs_of_bodies += [ContactPair("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
@@ -89,10 +89,10 @@ class Clearances(NamedTuple):
 
     Fields:
         clearance: (n,) the smallest of all clearances, m; negative where two bodies meet; inf where nothing can meet.
-        nearest: (n,) index in `Scene.contact_pairs` of the nearest two bodies; -1 where nothing can meet.
+        nearest: (n,) index in `Scene.contact_pairs` of the two nearest bodies; -1 where nothing can meet.
         cables: (n,) the smallest clearance of two cables, m; inf where none can meet.
         obstacles: (n,) the smallest clearance of obstacles from cables and platform, m.
-        platform: (n,) smallest clearance of cables from their own platform, m; at most `Scene.leave` for full cables.
+        platform: (n,) smallest clearance of cables from their own platform, m; at most `Scene.leave`.
         is_open: (n,) whether the smallest clearance is within rounding of the threshold.
     """
 
@@ -112,7 +112,7 @@ def scene(
     body: Body | None = None,
     leave: float | None = None,
 ) -> Scene:
-    """A robot among the bodies that its cables can meet."""
+    """Make a scene: a robot among the bodies with which its cables can collide."""
     base = np.asarray(robot.base_points, float)
     diameters = np.asarray(diameter, float)
     if (diameters.ndim and diameters.shape != (len(base),)) or not (np.isfinite(diameters) & (diameters >= 0.0)).all():
@@ -190,7 +190,7 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
 
 
 def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dtype) -> Clearances:
-    # Take coordinates from the centroid of the spools, so that float32 has its digits where they are needed.
+    # Subtract the centroid of the spools, so that no digits of float32 are lost to a distant origin.
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
@@ -223,7 +223,7 @@ def _smallest(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
     _, first, distances = terms[0]
     clearance, nearest = distances.real.copy(), distances.imag.astype(np.int32) + np.int32(first)
     for _, first, distances in terms[1:]:
-        # A pose with NaN has it from the first kernel on, and keeps it.
+        # A pose with NaN has NaN in the first kernel already, and keeps it, since comparisons with NaN are false.
         is_less = distances.real < clearance
         np.copyto(clearance, distances.real, where=is_less)
         np.copyto(nearest, distances.imag.astype(np.int32) + np.int32(first), where=is_less)
@@ -237,7 +237,7 @@ def _smallest(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
 
 
 def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
-    """Compiled functions of poses, each with its kind and the number of its first pair."""
+    """Compiled functions of poses, each with its kind of contact and the index of its first pair."""
     count, first = len(scene.base_points), 0
     points = _cast(
         kernels.Points(*map(as_float64, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype

@@ -1,6 +1,6 @@
 """Compiled functions of `clearance`: the nearest bodies of each kind of contact, one lane a pose.
 
-Each gives one complex number a pose, as `clearance_lanes.nearest` does: the clearance, m, and the number of the
+Each returns one complex number a pose, as `clearance_lanes.nearest` does: the clearance, m, and the index of the
 pair.
 """
 
@@ -144,7 +144,7 @@ def of_cables(points: Points, poses: PoseLanes, pairs: Int[np.ndarray, "n_pairs 
 @jax.jit
 def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[Array]]:
     # Return the points at which cables leave their spools, None if these are fixed, and the rays from there to the
-    # platform, components (n_cables, n): a loop over values that its own compiled call has stored would be slow.
+    # platform, components (n_cables, n); a loop over values that its own compiled call has stored would be slow.
     if poses.ends is not None:
         ends, rays = _cables(points, poses)
         return [jnp.stack([end[i] for end in ends]) for i in range(3)], [
@@ -170,7 +170,7 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
         (i, j), index = pair
         thick = 0.5 * (points.diameters[i] + points.diameters[j])
         distance = segments(*line(i), *line(j)) - thick
-        # Keep the first of equal distances, and NaN, as `clearance_lanes.nearest` does.
+        # Keep the first of equal distances, and keep NaN, as `clearance_lanes.nearest` does.
         is_kept = jnp.isnan(jnp.real(best)) | (distance >= jnp.real(best))
         return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, index))), None
 
@@ -181,7 +181,7 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
 
 @jax.jit
 def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Complex[Array, "n"]:
-    """The cable that is the nearest to an obstacle."""
+    """The cable nearest to an obstacle."""
     ends, rays = _cables(points, poses)
     gaps = []
     for k, (end, ray) in enumerate(zip(ends, rays, strict=True)):
@@ -196,20 +196,20 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Complex[Array
 
 
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
-    # Return a segment in the axes of a box, from the centre of the box.
+    # Transform a segment to the axes of a box, with the box's centre as origin.
     axes = [_three(row) for row in brick.rotation]
     return lanes.rotated_back(axes, _less(start, _three(brick.centre))), lanes.rotated_back(axes, ray)
 
 
 @jax.jit
 def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Float[Array, ""]) -> Complex[Array, "n"]:
-    """The cable that is the nearest to its own platform."""
+    """The cable nearest to the platform."""
     rotation, gaps = _rotation(poses), []
     _, rays = _cables(points, poses)
     for k, ray in enumerate(rays):
         away = tuple(-x for x in _inward(rotation, ray))
         length = jnp.sqrt(lanes.dot(away, away))
-        # A cable that is shorter than this length keeps only its end.
+        # A cable shorter than the part that is left out shrinks to the point at its spool.
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
         start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
         rest = tuple((1.0 - part) * x for x in away)
@@ -225,7 +225,7 @@ def _from_body(body: BodyShape, start: Vector, ray: Vector) -> Array:
 
 @jax.jit
 def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Complex[Array, "n"]:
-    """The platform and a sphere or a cylinder."""
+    """Clearance of the platform from a sphere or a cylinder."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
     start = _inward(rotation, _less(_three(rod.start), poses.position))
@@ -235,7 +235,7 @@ def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Complex[Arr
 
 @jax.jit
 def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Complex[Array, "n"]:
-    """The platform, a box, and another box: the largest gap between their shadows on a line."""
+    """Clearance of a platform that is a box from another box: the largest gap between their projections on a line."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     axes = [_three(row) for row in body.rotation]
     edges = [lanes.rotated_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
@@ -246,7 +246,7 @@ def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Complex[Array, "n"]
 
 @jax.jit
 def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Complex[Array, "n"]:
-    """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line."""
+    """Clearance of a polyhedral platform from a box: the largest gap between their projections on a line."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     edges = [tuple(zero + x for x in _inward(rotation, _three(column))) for column in solid.rotation.T]
     centre = _inward(rotation, _less(_three(solid.centre), poses.position))

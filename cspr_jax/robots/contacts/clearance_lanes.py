@@ -1,9 +1,8 @@
 """Signed distances of cables from each other and from solid shapes, one lane a pose, without branches.
 
-A cable is a segment without thickness here; callers subtract half the diameter. Finite ends never give NaN. Every
-formula is exact outside of the shape. Products that vanish for parallel segments are computed from vector products, not
-from differences of squares, so that their rounding falls with the angle and the distance keeps its digits at every
-angle.
+Cables are segments without thickness in this module; callers subtract half the diameter. Finite ends never give NaN.
+Every formula is exact outside of the shape. Terms that vanish for parallel segments are computed from vector products,
+not from differences of squares, so that their rounding errors decrease with the angle and distances keep their digits.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ Numbers = Sequence[Array]
 
 
 def _tiny(template: Array) -> Array:
-    # Return a number that is negligible beside a sum of squares, and keeps 0 / 0 from being NaN.
+    # A number that is negligible in a sum of squares, but prevents 0 / 0.
     return jnp.asarray(np.finfo(template.dtype).tiny, template.dtype)
 
 
@@ -32,7 +31,7 @@ def _greater(a: Array, b: Array) -> Array:
 
 
 def _fraction(x: Array) -> Array:
-    # Clip to [0, 1] by one instruction each; `jnp.clip` would take care of NaN, which shows in the distance anyway.
+    # Clip to [0, 1] by one instruction each; `jnp.clip` would propagate NaN, which appears in the distance anyway.
     return nan_ignoring_min(_greater(x, jnp.zeros_like(x)), jnp.ones_like(x))
 
 
@@ -47,7 +46,7 @@ def _along(start: Vector, ray: Vector, part: Array) -> Vector:
 def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Float[Array, "..."]:
     """Distance of two segments."""
     # Find the nearest points of the lines, then clip each to its segment: the last two steps are exact where one point
-    # is an end, and for parallel lines wherever the first step starts.
+    # is an end, and for parallel lines from any point found in the first step.
     offset, normal = _less(b, a), cross(u, v)
     uu, vv, uv, tiny = dot(u, u), dot(v, v), dot(u, v), _tiny(offset[0] * u[0])
     s = _fraction(dot(cross(offset, v), normal) / _greater(dot(normal, normal), tiny))
@@ -74,8 +73,8 @@ def segment_box(a: Vector, u: Vector, half: Numbers) -> Float[Array, "..."]:
 def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     """Distance of a segment from a box.
 
-    Half the derivative of the squared distance along the segment rises, and is linear between the six planes of the
-    faces. Its zero lies between the last plane (or end) at which it is not positive and the first at which it is not
+    Half the derivative of the squared distance increases along the segment, and is linear between the six planes of the
+    faces. It vanishes between the last plane (or end) at which it is not positive and the first at which it is not
     negative.
     """
 
@@ -87,7 +86,7 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     start, stop, at_start, at_stop = zero, one, derivative(zero), derivative(one)
     is_first, is_last = at_start >= 0.0, at_stop <= 0.0
     for k in range(3):
-        # For a segment that lies in a plane of a face any point will do.
+        # A segment parallel to a plane does not cross it: any point will do.
         inverse = 1.0 / jnp.where(u[k] == 0.0, jnp.ones_like(u[k]), u[k])
         for side in (-half[k], half[k]):
             part = _fraction((side - a[k]) * inverse)
@@ -98,7 +97,7 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     steep = at_stop - at_start
     part = start - at_start * (stop - start) / jnp.where(steep > 0.0, steep, one)
     part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
-    # If the derivative in a plane is small beside its own rounding, that plane is the better point.
+    # Try both planes too: where rounding errors dominate the derivative at one of them, that point is the nearer one.
     first, *others = (_beyond(_along(a, u, fraction), half) for fraction in (part, start, stop))
     minimum = dot(first, first)
     for beyond in others:
@@ -112,10 +111,10 @@ def _beyond(point: Vector, half: Numbers) -> Vector:
 
 
 def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
-    """Largest gap between the shadows of a segment and a box on a line: not positive where they meet.
+    """Largest gap between the projections of a segment and a box on a line: not positive where they meet.
 
-    The lines are the normals to the faces of the box, and to the segment and an edge: the normals to the faces of the
-    sum of both shapes. So a negative largest gap is minus the least translation that parts the shapes.
+    The lines are normal to a face of the box, or to the segment and an edge of the box: these are the normals of the
+    Minkowski sum of both shapes, so that a negative gap is minus the smallest translation that separates the shapes.
     """
     w = tuple(0.5 * x for x in u)
     c = tuple(x + y for x, y in zip(a, w, strict=True))
@@ -127,7 +126,7 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
         square = w[i] * w[i] + w[j] * w[j]
         shadow = jnp.abs(c[i] * w[j] - c[j] * w[i]) - (half[i] * extent[j] + half[j] * extent[i])
         across = shadow / jnp.sqrt(_greater(square, _tiny(square)))
-        # A segment along the third axis has no such line.
+        # A segment parallel to the edge has no normal common to both.
         gap = jnp.where((square > _tiny(square)) & (across > gap), across, gap)
     return gap
 
@@ -167,7 +166,7 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
     def clip(face, ends):
         high, rate = _of_face(hull, face, a, u)
         meet = -high / jnp.where(rate == 0.0, jnp.ones_like(rate), rate)
-        # A segment parallel to a face lies entirely outside of its plane, or inside.
+        # A segment parallel to a face lies entirely on one side of the face's plane.
         first = jnp.where(rate < 0.0, _greater(meet, ends[0]), ends[0])
         last = jnp.where(rate > 0.0, nan_ignoring_min(meet, ends[1]), ends[1])
         return first, jnp.where((rate == 0.0) & (high > 0.0), -jnp.ones_like(last), last)
@@ -184,14 +183,14 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
 
 
 def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array, Array]:
-    # Return the height of a start above the plane of a face, and its rate along the segment.
+    # Height of the start above the plane of a face, and its rate of change along the segment.
     normal, corner = hull.normals[face], hull.triangles[face, 0]
     three = [normal[k] for k in range(3)]
     return dot(three, [a[k] - corner[k] for k in range(3)]), dot(three, u)
 
 
 def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
-    """Distance of a segment from a polyhedron that it does not enter: from an edge, or of an end from a face."""
+    """Distance of a segment from a polyhedron that it does not enter: smallest distance from an edge, or of an end."""
 
     def to_edge(edge, smallest):
         start, end = hull.edges[edge, 0], hull.edges[edge, 1]
@@ -207,7 +206,7 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
             for i in range(3):
                 side, out = triangle[(i + 1) % 3] - triangle[i], [point[k] - triangle[i, k] for k in range(3)]
                 areas.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
-            # Triangles may be ordered either way around.
+            # The corners of triangles may be in either order.
             inside = ((areas[0] >= 0.0) & (areas[1] >= 0.0) & (areas[2] >= 0.0)) | (
                 (areas[0] <= 0.0) & (areas[1] <= 0.0) & (areas[2] <= 0.0)
             )
@@ -236,16 +235,16 @@ def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers)
             radius = radius + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
             tiny = _tiny(square)
             across = (jnp.abs(centre[i] * x + centre[j] * y) - radius) / jnp.sqrt(_greater(square, tiny))
-            # Parallel edges have no such line.
+            # Parallel edges have no unique common normal.
             gap = jnp.where((square > tiny) & (across > gap), across, gap)
     return gap
 
 
 def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Float[Array, "..."]:
-    """Largest gap between the shadows of a convex polyhedron and a box on a line, in the axes of the polyhedron.
+    """Largest gap between projections of a convex polyhedron and a box on a line, in the axes of the polyhedron.
 
-    The lines are the normals to the faces of both shapes, and to an edge of each if the polyhedron reaches farthest
-    along the line at its edge: the normals to the faces of the sum of both shapes.
+    The lines are normal to a face of either shape, or to an edge of each where the polyhedron extends farthest along
+    the line at its edge: these are the normals of the Minkowski sum of both shapes.
     """
 
     def gap(line, reached):
@@ -269,7 +268,7 @@ def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Num
 
 
 def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest: Array) -> Array:
-    # Compare the shadows on the lines across an edge of the polyhedron and an edge of the box.
+    # Compare projections on the lines normal to an edge of the polyhedron and an edge of the box.
     start, (a, b) = (
         [hull.edges[edge, 0, k] for k in range(3)],
         [[hull.sides[edge, i, k] for k in range(3)] for i in (0, 1)],
@@ -277,13 +276,13 @@ def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest
     along, sense = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
     for axis in axes:
         line = cross(along, axis)
-        # Remove the part along the edge that rounding leaves if the edges are nearly parallel.
+        # Remove the component along the edge that rounding leaves where the edges are nearly parallel.
         part = dot(line, along) / dot(along, along)
         line = tuple(x - part * y for x, y in zip(line, along, strict=True))
         square = dot(line, line)
         from_a, to_b = dot(cross(a, line), sense), dot(cross(line, b), sense)
-        # The edge reaches farthest where the line lies between the normals of both faces, in one direction or the
-        # other.
+        # The polyhedron extends farthest at the edge if the line, in either direction, lies between the normals of the
+        # faces beside the edge.
         one = jnp.ones_like(square)
         sign = jnp.where(
             (from_a >= 0.0) & (to_b >= 0.0), one, jnp.where((from_a <= 0.0) & (to_b <= 0.0), -one, 0.0 * one)

@@ -17,19 +17,19 @@ from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
 from cspr_jax.robots.model.shapes import Box, Cylinder, Hull, is_flat
 
-# Over the extent of a scene:
-DEEPEST = 1e-4  # depth below which penetrations are not distinguished
-THINNEST = 1e-9  # thickness of flat boxes
+# Lengths over the extent of a scene:
+DEEPEST = 1e-4  # depth from which on penetrations are not distinguished
+THINNEST = 1e-9  # thickness given to flat boxes
 
 
 class Shape(NamedTuple):
-    """Convex body with faces, in axes in which it does not move.
+    """Convex body with faces, in axes that move with it.
 
     Fields:
         corners: (m, 3) m.
         edges: (n_edges, 2) indices of corners.
         faces: (n_faces, 3) corners of triangles, counterclockwise as seen from outside.
-        planes: of the faces.
+        planes: planes of the faces.
     """
 
     corners: Any
@@ -43,17 +43,17 @@ class Bodies(NamedTuple):
 
     Fields:
         pairs: (n_pairs, 2) cables that can meet.
-        points: (n_cables, 3) at which they are attached, platform axes, m.
+        points: (n_cables, 3) attachment points, platform axes, m.
         radii: (n_cables,) halves of the diameters of the cables, m.
         rods: (n_rods, 2, 3) ends of the axes of spheres and cylinders, m.
         rod_radii: (n_rods,) m.
-        boxes: leaves (n_boxes, ...).
-        order: (n_obstacles,) index of each obstacle among rods, and boxes behind them.
+        boxes: boxes, leaves (n_boxes, ...).
+        order: (n_obstacles,) index of each obstacle in the list of all rods followed by all boxes.
         body: shape of the platform in its axes; None: not known.
-        leave: () length of each cable next to its attachment point that may meet the platform, m.
+        leave: () length of each cable next to its attachment point that may touch the platform, m.
         sectors: (n_cables, 2, 3) sides and (3,) normal of `interference.Contacts`; None: not checked.
         extent: () largest coordinate, m.
-        deepest: () m.
+        deepest: () depth from which on penetrations are not distinguished, m.
     """
 
     pairs: Any
@@ -71,18 +71,18 @@ class Bodies(NamedTuple):
 
 
 def has_sectors(robot: AnyRobot, scene: Scene) -> bool:
-    """Tell whether the criterion of the thesis stands for the shape of a platform."""
+    """Tell whether the criterion of the thesis replaces the shape of the platform."""
     return scene.body is None and robot.pattern == RIGID and is_flat(np.asarray(scene.platform_points))
 
 
 def contact_pairs(robot: AnyRobot, scene: Scene) -> tuple[ContactPair, ...]:
-    """Pairs of bodies in the order of their bounds."""
+    """Pairs of bodies in the order of the bounds of their clearances."""
     over = range(robot.n_cables) if has_sectors(robot, scene) else ()
     return scene.contact_pairs + tuple(ContactPair("platform", k, -1) for k in over)
 
 
 def default_scene(robot: AnyRobot) -> Scene:
-    """A robot without obstacles, whose cables meet each other."""
+    """Scene of a robot without obstacles and without a shape of its platform."""
     return clearance.scene(robot, diameter=0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter))
 
 
@@ -124,7 +124,7 @@ def shape_corners(robot: AnyRobot, scene: Scene) -> Float[np.ndarray, "m 3"] | N
 
 
 def platform_corners(robot: AnyRobot, bodies: Bodies) -> Any:
-    """Points that reach as low as a platform: where cables are attached, and corners of its shape."""
+    """Points among which the lowest of a platform is found: attachment points, and corners of its shape."""
     corners = [bodies.points] if isinstance(robot, PlatformRobot) else []
     corners += [] if bodies.body is None else [bodies.body.corners]
     return jnp.concatenate(corners) if corners else None

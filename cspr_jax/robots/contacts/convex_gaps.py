@@ -1,11 +1,12 @@
 """Gaps between moving convex bodies over a block of time: bounds, from affine bounds of their corners.
 
-For a direction n and all corners a and b of two bodies, the smallest n . (b - a) / |n| is no larger than their signed
-distance (the distance of bodies that are separated, minus the smallest translation that parts bodies that are not). The
-direction is that of the nearest points in the middle of the block, and turns with the block as they do then: a line
-n(s) = e + s e', so that bounds close with the square of the length of the block. Any direction gives a proof, so it
-need not be known with bounds. From above the distance is bounded by that of two fixed points of the bodies, the nearest
-ones in the middle; of bodies that meet, by how deep a fixed point of one is below all faces of the other.
+For a direction n and all corners a and b of two bodies, the smallest n . (b - a) / |n| is a lower bound of their signed
+distance (the distance of separated bodies, or minus the smallest translation that separates overlapping ones). The
+direction is that between the nearest points in the middle of the block and turns at the rate that it has there,
+n(s) = e + s e', so that the error of the bound decreases with the square of the length of the block. Any direction
+gives a valid bound, so n needs no bounds itself. The upper bound is the distance between two fixed points of the
+bodies, the nearest ones in the middle; for overlapping bodies, minus the depth of a point of one below all faces of the
+other.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm_squar
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import nearest
 
-# Edges at a smaller angle than about this count as parallel: their common normal is not well known.
+# Edges whose angle has a smaller squared sine count as parallel, since their common normal would be inaccurate.
 PARALLEL_SQUARE = 1e-8
 TINY = 1e-200
 DISTANCE_ERROR = 1e-14
@@ -59,10 +60,10 @@ class Features(NamedTuple):
     """The nearest features of two bodies.
 
     Fields:
-        bodies: their edges and faces.
-        kind: 0: edges; 1: a corner of the first and a face of the second; 2: the other way round.
+        bodies: edges and faces of the two bodies.
+        kind: 0: two edges; 1: a corner of the first and a face of the second; 2: a face of the first and a corner.
         first: index of the edge, corner or face of the first body.
-        second: likewise.
+        second: index of the edge, corner or face of the second body.
     """
 
     bodies: tuple[Solid, Solid]
@@ -71,7 +72,7 @@ class Features(NamedTuple):
     second: Any
 
     def nearest_on_edges(self, p: Float[Array, "m 3"], q: Float[Array, "k 3"]) -> tuple[list[Array], Array, Array]:
-        """Corners of the two edges that are the nearest ones, and the nearest points as fractions of these edges."""
+        """Corners of the two nearest edges, and the nearest points as fractions of these edges."""
         edges = [
             body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
             for body, k in zip(self.bodies, (self.first, self.second), strict=True)
@@ -107,14 +108,14 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Float[Array, ""], Flo
 
 
 def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBounds:
-    """A direction that turns at a constant rate, which follows that of a function of points in the middle."""
+    """A direction that turns at a constant rate; value and rate are those of a function of points in the middle."""
     middles, derivatives = (tuple(getattr(x, name) for x in points) for name in ("middle", "linear"))
     middle, turn = jax.jvp(direction, middles, derivatives)
     return AffineBounds(middle, jnp.where(jnp.sum(turn**2) <= 1.0, turn, 0.0), jnp.zeros_like(middle))
 
 
 def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
-    """Smallest component of vectors along a direction that turns."""
+    """Smallest component of vectors along a turning direction."""
     middle, turn = line.middle, line.linear
     low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
     length = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
@@ -127,7 +128,7 @@ def distance_bound(first: AffineBounds, second: AffineBounds) -> Float[Array, ""
 
 
 def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
-    """Bound of how deep a body reaches into another one that does not move, by points of its edges."""
+    """Upper bound of the signed distance of a body from a fixed one, by the depths of points of its edges."""
     start, end = (body.corners.each(lambda x, k=k: x[body.edges[:, k]]) for k in range(2))
     part = inner_fractions(start.middle, end.middle, planes)[:, None]
     points = start * (1.0 - part) + end * part
@@ -139,7 +140,7 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
 def inner_fractions(
     start: Float[Array, "n_edges 3"], end: Float[Array, "n_edges 3"], planes: FacePlanes
 ) -> Float[Array, "n_edges"]:
-    """Points of edges in the middle of their parts behind all planes."""
+    """Midpoints, as fractions of edges, of the parts of edges that are behind all planes."""
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
     first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
@@ -203,7 +204,7 @@ def parting_direction(features: Features, p: Float[Array, "m 3"], q: Float[Array
     gap, normal = b + t * v - a - s * u, jnp.cross(u, v)
     inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
     inside &= jnp.dot(normal, normal) > PARALLEL_SQUARE * jnp.dot(u, u) * jnp.dot(v, v)
-    # The common normal of edges is known however near they are, if both points are inside of them.
+    # The common normal of two edges is accurate even if they nearly touch, if both nearest points are inside of them.
     gap = jnp.where(inside, jnp.where(jnp.dot(normal, gap) < 0.0, -normal, normal), gap)
     direction = _unit(gap)
     for kind, corners, body, face, sign in (
@@ -221,7 +222,7 @@ def parting_direction(features: Features, p: Float[Array, "m 3"], q: Float[Array
 def nearest_weights(
     features: Features, p: Float[Array, "m 3"], q: Float[Array, "k 3"]
 ) -> tuple[Float[Array, "m"], Float[Array, "k"]]:
-    """Weights of corners, which make the nearest points."""
+    """Weights of the corners in the nearest points."""
     (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
 
     def spread(count: int, corners: Array, fractions: list[Array]) -> Array:

@@ -1,4 +1,4 @@
-"""Cables that meet each other or the platform, thesis section 3.10.2: vectors in one state, tests between two."""
+"""Cables that meet each other or the platform, thesis section 3.10.2: vectors in a state, tests between two states."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from jax import Array
 from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.robots.model.platform import PlatformRobot, rays, separate_pairs
 
-# Points nearer than this part of the platform's extent are one corner.
+# Points closer together than this fraction of the platform's extent are one corner.
 SAME = 1e-9
 PARALLEL = 1e-14
-# Squares of lengths from here on; a segment may be a point.
+# Smallest divisor in place of squared lengths, which are 0 where a segment is a point.
 TINY = 1e-200
 
 
@@ -24,9 +24,9 @@ class Contacts(NamedTuple):
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
-        sides: (n_cables, 2, 3) vectors along the edges of the sector of each platform point, platform axes, m. The
+        sides: (n_cables, 2, 3) vectors along the sides of the sector of each platform point, platform axes, m. The
             sector extends from the second side to the first, counterclockwise about the normal; for a point on an edge
-            it is half of the plane. Both sides are zero where it is the whole plane, around a point inside.
+            it is half of the plane. For a point inside it is the full plane, and both vectors are zero.
         normal: (3,) normal of the platform, platform axes.
     """
 
@@ -36,7 +36,7 @@ class Contacts(NamedTuple):
 
 
 def contacts(robot: PlatformRobot) -> Contacts:
-    """Contacts possible on a robot: pairs of cables without a common point, and sectors of the platform.
+    """Possible contacts of a robot: pairs of cables without a common point, and sectors of the platform.
 
     The platform is the convex hull of its points, seen along its normal.
     """
@@ -49,12 +49,12 @@ def contacts(robot: PlatformRobot) -> Contacts:
 
 
 def _sector(points: np.ndarray, flat: np.ndarray, corner: int) -> np.ndarray:
-    # Return the sides of the sector of a point, (2, 3); cables that share a point share its sector.
+    # Sides of the sector of a point, (2, 3); cables that share a point share the sector.
     away = flat - flat[corner]
     others = np.flatnonzero(np.linalg.norm(away, axis=1) > SAME * np.linalg.norm(flat, axis=1).max())
     angles = np.arctan2(away[others, 1], away[others, 0])
     order = np.argsort(angles)
-    # The widest angle without other points lies outside of the hull.
+    # The largest angle between neighbouring directions to other points is outside of the hull.
     free = np.diff(angles[order], append=angles[order[0]] + 2.0 * np.pi)
     widest = int(free.argmax())
     if free[widest] < np.pi - SAME:
@@ -84,7 +84,7 @@ def between(
 def nearest(
     a: Float[Array, "... 3"], u: Float[Array, "... 3"], b: Float[Array, "... 3"], v: Float[Array, "... 3"]
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-    """Find where segments a + s u and b + t v are nearest to each other."""
+    """Parameters s and t at which segments a + s u and b + t v are nearest to each other."""
     # Find the nearest points of the lines, then clip them to the segments.
     offset = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
@@ -117,10 +117,10 @@ def platform_hit(
     before: Float[np.ndarray, "... n_cables 3"],
     after: Float[np.ndarray, "... n_cables 3"],
 ) -> Bool[np.ndarray, "... n_cables"]:
-    """Cables that passed over the platform between two times, as in the thesis, in platform axes."""
+    """Cables that passed over the platform between two times, by the criterion of the thesis, in platform axes."""
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0
-    # Find the direction within the platform's plane, a combination of both directions with positive weights.
+    # Find the combination of both directions, with positive weights, that lies in the platform's plane.
     weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
     first, second = (np.einsum("...jk,jk->...j", weight, np.cross(normal, sides[:, k])) for k in (1, 0))
     return through & (first >= 0.0) & (second <= 0.0)

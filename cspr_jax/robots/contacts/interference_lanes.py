@@ -38,7 +38,7 @@ def gap(offset: Vector, u: Vector, v: Vector) -> Vector:
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
-    """Residual of the projection of a cable onto the sector of its corner."""
+    """Vector from the nearest point of the sector of a corner to the end of its cable."""
     height = dot(normal, seen)
     up = tuple(height * n for n in normal)
     flat = tuple(v - w for v, w in zip(seen, up, strict=True))

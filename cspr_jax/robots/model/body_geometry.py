@@ -10,11 +10,11 @@ from cspr_jax.robots.model.patterns import Pattern
 from cspr_jax.robots.model.point_mass import LARGEST_LENGTH, checked_coordinates
 from cspr_jax.robots.model.spool_plane import is_on_line
 
-# Points nearer to each other than this part of the largest distance are one point.
+# Points closer together than this fraction of the largest distance are one point.
 SAME = 1e-9
-# Tolerance for rounding of an inertia tensor: of its symmetry, and of I1 + I2 = I3 for a flat body.
+# Tolerance for rounding of inertia tensors, in tests of symmetry and of I1 + I2 = I3 for flat bodies.
 INERTIA_TOLERANCE = 1e-9
-# The mass centre of a rod may lie beside the line of its attachment points by this part of its length.
+# Largest distance of a rod's mass centre from the line of its attachment points, as a fraction of its length.
 BESIDE = 1e-6
 
 
@@ -25,7 +25,7 @@ def is_same(points: Float[np.ndarray, "n 3"], first: int, second: int) -> bool:
 
 
 def checked_platform(platform_points, count: int, pattern: Pattern) -> Float[np.ndarray, "n_cables 3"]:
-    """Attachment points of a body."""
+    """Check the attachment points of a body."""
     points = checked_coordinates("platform_points", platform_points, pattern.dof)
     if len(points) != count:
         raise InputError(
@@ -51,7 +51,7 @@ def checked_platform(platform_points, count: int, pattern: Pattern) -> Float[np.
 def checked_centre(
     centre_of_mass, platform: Float[np.ndarray, "n_cables 3"], pattern: Pattern
 ) -> Float[np.ndarray, "3"]:
-    """Mass centre of a body."""
+    """Check the mass centre of a body."""
     centre = np.asarray(centre_of_mass, float)
     if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
         raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
@@ -67,7 +67,7 @@ def checked_centre(
 
 
 def checked_inertia(inertia, pattern: Pattern) -> Float[np.ndarray, "3 3"]:
-    """Inertia tensor of a body."""
+    """Check the inertia tensor of a body."""
     tensor = np.asarray(inertia, float)
     if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
         raise InputError("inertia", inertia, "three rows of three finite numbers, kg m^2")

@@ -36,7 +36,7 @@ class Limits:
         tension_max: (n_cables,) largest tensions, N.
         floor: () z of the floor, z down, m.
         cable_length_max: (n_cables,) largest lengths, m.
-        cable_speed_max: (n_cables,) largest speeds of paying out and of winding in, m/s.
+        cable_speed_max: (n_cables,) largest speeds in either direction, m/s.
         cable_acceleration_max: (n_cables,) largest accelerations of either sign, m/s^2.
         speed_max: () largest speed of the mass centre, m/s.
         acceleration_max: () largest acceleration of the mass centre, m/s^2.

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion
 
-# Orientations are neighbours up to this many steps apart on the grid of equal volumes.
+# Largest distance of neighbours on the grid of equal volumes, in steps.
 NEAR = 1.5
 
 
@@ -17,8 +17,8 @@ class OrientationGrid(NamedTuple):
 
     Fields:
         angles: (n, 3) tilt and torsion (phi, theta, sigma), rad.
-        volume: (n,) part of SO(3) that each orientation stands for.
-        neighbours: (m, 2) indices of neighbours.
+        volume: (n,) fraction of SO(3) that each orientation represents.
+        neighbours: (m, 2) indices of pairs of neighbours.
         start: index of the reference orientation.
     """
 
@@ -38,7 +38,7 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
     circle = np.arange(count) * step
     torsion = np.where(circle > math.pi, circle - 2.0 * math.pi, circle)
     tilts = np.arange(1, divisions) * step
-    # Index of (tilt, azimuth, torsion), after the untilted ones.
+    # Indices of the tilted orientations (tilt, azimuth, torsion), which follow the untilted ones.
     index = count + np.arange(len(tilts) * count * count).reshape(len(tilts), count, count)
     mesh = np.meshgrid(tilts, circle, torsion, indexing="ij")
     tilted = np.stack([mesh[1].ravel(), mesh[0].ravel(), mesh[2].ravel()], axis=1)
@@ -51,7 +51,7 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
         (np.arange(count), np.roll(np.arange(count), -1)),
     ]
     neighbours = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in steps])
-    # Each tilt stands for a band of tilts around it, of this area.
+    # Each tilt represents a band of tilts around it, whose area on the sphere is this.
     area = np.cos(tilts - 0.5 * step) - np.cos(tilts + 0.5 * step)
     volume = np.repeat(area * step**2 / (8.0 * math.pi**2), count * count)
     cap = (1.0 - math.cos(0.5 * step)) * 2.0 * math.pi * step / (8.0 * math.pi**2)
@@ -59,13 +59,13 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
 
 
 def equal_volume_grid(divisions: int) -> OrientationGrid:
-    """Cells of equal volume, nearly as wide as they are long, pi / divisions apart.
+    """Cells of equal volume and nearly equal extent in all directions, some pi / divisions apart.
 
     They are products of cells of equal area on the sphere of tilts (in bands of equal cells) with equal steps of
-    torsion: in the metric of SO(3) a torsion moves at a right angle to the tilts.
+    torsion, since torsion is orthogonal to tilt in the metric of SO(3).
     """
     count, step = 2 * divisions, math.pi / divisions
-    cells = [1]  # numbers of cells: one around the vertical, then band by band
+    cells = [1]  # numbers of cells of the bands; the first band is one cell around the vertical
     cap = math.acos(1.0 - 2.0 / (4.0 * math.pi / step**2))
     rings = max(1, round((math.pi - 2.0 * cap) / step))
     height = (math.pi - 2.0 * cap) / rings
@@ -74,7 +74,7 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
         cells.append(max(1, round(2.0 * math.pi * area / step**2)))
     cells.append(1)
     edges = np.concatenate([[0], np.cumsum(cells)]) / sum(cells)
-    # Shift bands so that all cells have the same area; each orientation is at the middle of the area of its cell.
+    # Move the edges of bands so that all cells have the same area; each orientation halves the area of its band.
     middle = np.arccos(1.0 - (edges[:-1] + edges[1:]))
     middle[0], middle[-1] = 0.0, math.pi
     tilt = np.repeat(middle, cells)
@@ -88,8 +88,8 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
 def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, np.ndarray]:
     """Orientations of a cone of tilts, its boundary included, some pi / divisions apart.
 
-    They are products of rings of tilts with torsions. Each is at the middle of the part of SO(3) that it stands for,
-    except orientations on the boundary.
+    They are products of rings of tilts with torsions. Each is at the middle of the part of SO(3) that it represents,
+    except on the boundary.
     """
     step = math.pi / divisions
     rings = math.ceil(tilt / step - 1e-9)
@@ -121,7 +121,7 @@ def planar_grid(divisions: int, largest: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _near(angles: np.ndarray, angle: float) -> np.ndarray:
-    # Both quaternions of an orientation are in the tree; count each pair once.
+    # The tree contains both quaternions of each orientation; keep each pair of neighbours once.
     quaternions = from_tilt_torsion(angles)
     tree = cKDTree(np.concatenate([quaternions, -quaternions]))
     pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(quaternions)

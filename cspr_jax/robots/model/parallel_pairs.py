@@ -1,10 +1,10 @@
 """Six cables in three parallel pairs, and the equivalent point mass on three cables.
 
-The cables of a pair run from A and A' to B and B' with A - A' = B - B', and one winch keeps them equally long: a
-parallelogram, so that the platform only translates. With the mass centre P on the line through B and B', at
-B + lambda (B' - B), the moments of a pair about P vanish if and only if its tensions are as 1 - lambda to lambda. All
-forces then act at P, along cables that leave from A + lambda (A' - A) (Machines 11 (2), 2023, 224, section 2.2, which
-gives lambda = 1/2; any lambda follows in the same way).
+The cables of a pair run from A and A' to B and B' with A - A' = B - B', and one winch keeps them equally long: they
+form a parallelogram, so that the platform only translates. With the mass centre P on the line through B and B', at
+B + lambda (B' - B), the moment of a pair about P vanishes if and only if its tensions have the ratio of 1 - lambda to
+lambda. All forces then act at P, along cables that leave from A + lambda (A' - A) (Machines 11 (2), 2023, 224, section
+2.2, for lambda = 1/2; any lambda follows in the same way).
 
 NumPy alone, since files are checked without jax.
 """
@@ -20,13 +20,13 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.spool_plane import is_on_line, is_vertical
 
 COUNT = 6
-# Tolerance for cables of a pair to be parallel, and for the mass centre to lie on the line between their attachment
-# points, over the largest distance of a spool from the centroid; and smallest distance of the mass centre from the ends
-# of this line, over its length.
+# Tolerance of the tests that cables of a pair are parallel and that the mass centre lies on the line between their
+# attachment points, over the largest distance of a spool from the centroid; and smallest distance of the mass centre
+# from the ends of this line, over its length.
 SAME_LINE = 1e-6
-# Below this determinant of unit moments the cables let the platform turn.
+# Below this determinant of unit moments the cables do not prevent rotations of the platform.
 SMALLEST_MOMENTS = 1e-6
-# Positions at which this is tested, from the centroid of the spools, over their radius.
+# Positions at which the determinant is tested, from the centroid of the spools, over their radius.
 _POSITIONS = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
 ALLOWED = "must be six cables in three parallel pairs, with the mass centre between the points of each pair"
 
@@ -36,10 +36,10 @@ class ParallelPairs:
     """Three pairs of parallel cables.
 
     Fields:
-        cables: (3, 2) numbers of the cables from 0 on; pairs are in the order of their first cables.
-        fractions: (3, 2) of each cable in the tension of its pair, which is the tension of the equivalent's cable; 1
-            in sum.
-        exit_points: (3, 3) spools of the equivalent, in the axes of the spools, m.
+        cables: (3, 2) indices of the cables; pairs are in the order of their first cables.
+        fractions: (3, 2) tension of each cable over the tension of its pair, which is that of the equivalent's cable;
+            the sum of each pair is 1.
+        exit_points: (3, 3) spools of the equivalent robot, in the axes of the spools, m.
     """
 
     cables: np.ndarray
@@ -47,14 +47,14 @@ class ParallelPairs:
     exit_points: np.ndarray
 
     def tensions(self, of_pairs) -> Float[np.ndarray, "... 6"]:
-        """Tensions of all cables."""
+        """Tensions of all cables, from tensions of the pairs."""
         tensions = np.asarray(of_pairs, float)
         each = np.empty((*tensions.shape[:-1], COUNT))
         each[..., self.cables] = tensions[..., None] * self.fractions
         return each
 
     def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> Float[np.ndarray, "3"]:
-        """Limits of the pairs with which all cables keep their limits."""
+        """Limits of the pairs that make all cables keep their own limits."""
         limits = np.broadcast_to(np.asarray(of_cables, float), (COUNT,))[self.cables]
         limits = limits / self.fractions if is_tension else limits
         return limits.max(1) if is_least else limits.min(1)
@@ -82,7 +82,7 @@ def _error(words: str) -> InputError:
 
 
 def _matched(offsets: np.ndarray, tolerance: float) -> np.ndarray:
-    # Cables of a pair have the same offset A - B. Of the fifteen matchings of six cables, take the one that fits best.
+    # Cables of a pair have the same offset A - B. Of the fifteen matchings of six cables take the best one.
     distances = np.linalg.norm(offsets[:, None] - offsets, axis=2)
     misses = {matching: max(distances[pair] for pair in matching) for matching in _matchings(tuple(range(COUNT)))}
     best = min(misses, key=lambda matching: misses[matching])
@@ -108,7 +108,7 @@ def _matchings(left: tuple[int, ...]) -> list[tuple[tuple[int, int], ...]]:
 
 
 def _tension_fractions(platform: np.ndarray, first: int, second: int, tolerance: float) -> tuple[float, float]:
-    # Return the fractions with which the moments of both cables about the mass centre are in balance.
+    # Fractions of the tensions with which the moments of both cables about the mass centre cancel.
     along = platform[second] - platform[first]
     square = float(along @ along)
     if not np.sqrt(square) > tolerance:
@@ -126,9 +126,9 @@ def _tension_fractions(platform: np.ndarray, first: int, second: int, tolerance:
 
 
 def _refuse_turning(exits: np.ndarray, along: np.ndarray) -> None:
-    # The moment of a pair is `along` x cable. If the lines of the spools meet in one point O, all moments are normal to
-    # the line from O to the platform, wherever it is, so that it can turn about this line; otherwise, as a rule, they
-    # are not.
+    # The moment of a pair is `along` x cable. If the lines of the spools of all pairs meet in one point O, all moments
+    # are normal to the line from O to the platform at every position, so that the platform can turn about this line;
+    # otherwise they usually are not.
     radius = np.linalg.norm(exits - exits.mean(0), axis=1).max()
     for position in exits.mean(0) + radius * _POSITIONS:
         cables = position - exits

@@ -8,11 +8,11 @@ class Pattern:
     """Motion pattern of an effector.
 
     Fields:
-        name: as files give it.
-        description: of the robots with this pattern, for people.
-        forces: fixed axes, 0 to 2, of the forces that the cables balance; guides or a joint carry all other forces.
-        moments: fixed axes of the moments that the cables balance; empty with `along_line`, where the axes are two of
-            the platform, normal to the line of its attachment points.
+        name: name in files.
+        description: text about the robots with this pattern.
+        forces: fixed axes, 0 to 2, along which the cables balance forces; guides or a joint carry all other forces.
+        moments: fixed axes about which the cables balance moments; empty with `along_line`, where the axes are two axes
+            of the platform, normal to the line of its attachment points.
         along_line: whether all cables are attached on one line of the platform, about which it does not turn.
         is_jointed: whether the effector turns about a fixed joint, the origin of its frame; moments are about it.
     """

@@ -48,13 +48,13 @@ class PlatformRobot:
         mass: () kg.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
         gravity: () downwards, m/s^2.
-        joints: for each cable the first cable that is attached at the same point; known when a function is compiled, so
-            that the point is computed once. Whoever replaces points so that others coincide must replace it, too.
+        joints: for each cable the first cable that is attached at the same point; static, so that compiled functions
+            compute the point once. Code that replaces points must replace this field too if other points coincide.
         limits: limits beyond taut cables.
-        name: for people.
-        z_axis: direction of z, "down" or "up"; known when a function is compiled.
-        pattern: name of a row of `robots.model.patterns`; known when a function is compiled.
-        centre_of_mass: (3,) from the origin of the platform frame, in platform axes, m; None: at the origin.
+        name: name, for texts.
+        z_axis: direction of z, "down" or "up"; static in compiled functions.
+        pattern: name of a row of `robots.model.patterns`; static in compiled functions.
+        centre_of_mass: (3,) mass centre from the origin of the platform frame, platform axes, m; None: at the origin.
         pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
     """
@@ -189,7 +189,7 @@ def across_line(robot: PlatformRobot) -> Float[Array, "3 2"]:
 
 
 def _spin_moment(robot: PlatformRobot, state: State) -> Array:
-    # Return the rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
+    # Rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
     inertia = state.rotation @ robot.inertia @ state.rotation.T
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         arm = state.rotation @ robot.centre_of_mass

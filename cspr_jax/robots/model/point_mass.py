@@ -30,10 +30,10 @@ from cspr_jax.robots.model.state import State
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
 SPATIAL, PLANAR, GUIDED = 3, 2, 1
-LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
-# Spools nearer to a plane than this, over their spread, lie in it.
+LARGEST_LENGTH = 1e6  # m; products of larger lengths could overflow or lose digits
+# Spools closer to a plane than this, over their spread, lie in it.
 IN_PLANE = 1e-9
-# Two spools count as level if their heights differ by less than this part of their distance.
+# Two spools count as level if their heights differ by less than this fraction of their distance.
 LEVEL = 1e-9
 
 Axis = Literal["down", "up"]
@@ -49,9 +49,9 @@ class PointMassRobot:
         mass: () mass of the effector, kg.
         gravity: () downwards, m/s^2.
         limits: limits beyond taut cables.
-        name: for people.
-        z_axis: direction of z, "down" or "up"; known when a function is compiled.
-        dof: degrees of freedom, 3, 2 in the plane y = 0, or 1 on a guide; known when a function is compiled.
+        name: name, for texts.
+        z_axis: direction of z, "down" or "up"; static in compiled functions.
+        dof: degrees of freedom: 3 in space, 2 in the plane y = 0, 1 on a guide; static in compiled functions.
         pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
     """
@@ -86,11 +86,11 @@ class PointMassRobot:
 
     @property
     def _directions(self) -> np.ndarray:
-        # Return the axes along which the effector moves: x and z in the plane y = 0.
+        # Axes along which the effector moves, such as x and z in the plane y = 0.
         return np.array(PATTERNS[self.pattern].forces)
 
 
-# Compiled functions do not see the name, so that they are not compiled again for another one.
+# The name is no field of the pytree, so that functions are not compiled again for robots of other names.
 jax.tree_util.register_dataclass(
     PointMassRobot,
     ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter"],
@@ -158,7 +158,7 @@ def _check_planar(points: np.ndarray) -> None:
 
 
 def checked_points(key: str, points, count: int) -> Float[np.ndarray, "n 3"]:
-    """Points of a robot's geometry."""
+    """Check points of a robot, which must not lie on one line, and their number."""
     points = checked_coordinates(key, points, count)
     if count > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
@@ -166,7 +166,7 @@ def checked_points(key: str, points, count: int) -> Float[np.ndarray, "n 3"]:
 
 
 def checked_coordinates(key: str, coordinates, count: int) -> Float[np.ndarray, "n 3"]:
-    """Points, wherever they lie."""
+    """Check points of any arrangement, and their number."""
     if isinstance(coordinates, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
     points = np.asarray(coordinates, float)
@@ -178,7 +178,7 @@ def checked_coordinates(key: str, coordinates, count: int) -> Float[np.ndarray, 
 
 
 def cable_units(robot: Robot, targets: Array) -> Float[Array, "n_cables 3"]:
-    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables."""
+    """Unit vectors of the cables, from the effector to the spools; with pulleys, along the free cables."""
     if robot.pulleys is not None:
         targets = jnp.broadcast_to(targets, robot.base_points.shape)
         leaving = exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets)
@@ -219,7 +219,7 @@ def rest_point(z0):
 
 @jax.jit
 def spool_radius(robot: Robot) -> Float[Array, ""]:
-    """Largest distance of a spool from the centroid of all."""
+    """Largest distance of a spool from the centroid of all spools."""
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
 
 
@@ -236,8 +236,8 @@ def in_one_plane(robot: PointMassRobot) -> bool:
 def plane_normal(robot: Robot) -> Float[Array, "3"]:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
-    For more than three spools it is the plane of least squares. The depth of p below the plane, measured along the
-    vertical, is normal . p.
+    For more than three spools it is the plane of least squares. The depth of p below the plane, along the vertical, is
+    normal . p.
     """
     a = robot.base_points
     if robot.dof == robot.n_cables == PLANAR:  # level

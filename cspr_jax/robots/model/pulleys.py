@@ -1,10 +1,10 @@
 """Points at which cables leave swivelling pulleys, and lengths that are wrapped around these.
 
-A cable reaches the pulley at its entry point A, running along the swivel axis k, about which the pulley turns towards
-the attachment point B. All lies in one plane: with e the unit vector normal to k on the side of B, the centre is
-C = A + r e. Let v = B - C, s^2 = v.v - r^2, and K the rotation by a right angle that takes -e to k. With unit vectors
-n, from C to the point at which the cable leaves, and t = K n along the cable, v = r n + s t. Hence
-n = (r v - s K v) / v.v and t = (s v + r K v) / v.v; the only angle needed is that of the wrapped arc, counted from A.
+A cable reaches the pulley at its entry point A, along the swivel axis k, about which the pulley turns towards the
+attachment point B. Pulley and cable lie in one plane: with e the unit vector normal to k on the side of B, the centre
+is C = A + r e. Let v = B - C, s^2 = v.v - r^2, and K the rotation by a right angle that takes -e to k. With unit
+vectors n, from C to the point at which the cable leaves, and t = K n along the cable, v = r n + s t. Hence
+n = (r v - s K v) / v.v and t = (s v + r K v) / v.v; the only angle needed is the angle of the wrapped arc, from A on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.lanes import Vector, combined, dot
 from cspr_jax.numerics.shapes import Float
 
-LARGEST_RADIUS = 1e6  # m, as coordinates
+LARGEST_RADIUS = 1e6  # m, the bound of coordinates
 
 
 @jax.tree_util.register_dataclass
@@ -32,7 +32,7 @@ class Pulleys:
 
     Fields:
         radius: (n_cables,) radius of the cable's centre line, 0 or more; m.
-        axes: (n_cables, 3) unit vectors of the swivel axes, in the direction in which the cables run when they enter.
+        axes: (n_cables, 3) unit vectors of the swivel axes, in the direction in which the cables enter.
     """
 
     radius: Array
@@ -40,13 +40,13 @@ class Pulleys:
 
 
 class Exit(NamedTuple):
-    """A cable behind its pulley. Vectors are arrays (..., 3), or three arrays (...) as lanes.
+    """A cable that leaves its pulley. Vectors are arrays (..., 3), or three arrays (...) as lanes.
 
     Fields:
         point: point at which the cable leaves the pulley, m.
         direction: unit vector from the point to the attachment point.
-        wrapped: (...) length on the pulley, m.
-        free: (...) length from the pulley to the attachment point, m; NaN where the latter lies within the pulley.
+        wrapped: (...) length of the arc on the pulley, m.
+        free: (...) length from the pulley to the attachment point, m; NaN where that point lies within the pulley.
     """
 
     point: Array | Vector
@@ -56,7 +56,7 @@ class Exit(NamedTuple):
 
 
 def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
-    """Pulleys of a robot, checked."""
+    """Pulleys of a robot, from checked radii and axes."""
     radii = np.asarray(radius, float)
     if radii.shape not in ((), (n_cables,)) or not ((radii >= 0.0) & (radii <= LARGEST_RADIUS)).all():
         raise InputError("pulley_radius", radius, f"a number >= 0, in m, or {n_cables}: one a cable")
@@ -80,7 +80,7 @@ def exits(
 ) -> Exit:
     """Find where cables leave their pulleys."""
     ray = target - entry
-    # A root at 0, or a point on the axis without a pulley, would have no derivative, even where it is not selected.
+    # Square roots at 0 have no derivative, which would spoil gradients even where their values are not selected.
     is_wheel = jnp.broadcast_to(radius > 0.0, ray.shape[:-1])
     high = jnp.sum(ray * axis, axis=-1)
     aside = ray - high[..., None] * axis
@@ -114,12 +114,12 @@ def exit_lanes(entry: Vector, axis: Vector, radius: Float[Array, "..."], target:
 
 
 def _nonzero(width):
-    # Avoid a division by zero for attachment points above or below the entry point, where any side is as good.
+    # Avoid a division by zero for attachment points above or below the entry point, where the side does not matter.
     return jnp.where(width > 0.0, width, 1.0)
 
 
 def _in_plane(radius, wide, high):
-    # Return point and direction along e and k, from A; `wide` and `high` are the components of B.
+    # Point and direction, from A, in components along e and k; `wide` and `high` are the components of B.
     x, z = wide - radius, high
     square = x * x + z * z
     free = jnp.sqrt(square - radius * radius)

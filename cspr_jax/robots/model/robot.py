@@ -34,11 +34,11 @@ class Robot(Protocol):
 
     @property
     def dof(self) -> int:
-        """Number of degrees of freedom; known when a function is compiled."""
+        """Number of degrees of freedom; static in compiled functions."""
 
     @property
     def pattern(self) -> str:
-        """Name of its pattern of motion, a row of `robots.model.patterns`; known when a function is compiled."""
+        """Name of its pattern of motion, a row of `robots.model.patterns`; static in compiled functions."""
 
     @property
     def n_cables(self) -> int:
@@ -78,7 +78,7 @@ MOVED = ("2T", "3T", "3R3T")  # patterns of trajectories and searches; workspace
 
 
 def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
-    """Refuse a robot that no trajectory and no search moves."""
+    """Refuse robots for which there are neither trajectories nor searches."""
     if robot.pattern not in MOVED:
         allowed = " or ".join(f'"{name}"' for name in MOVED)
         raise InputError("pattern", robot.pattern, f"{allowed} (what is asked for does not exist yet for others)")
@@ -89,7 +89,7 @@ def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
 
 
 def check_determined(robot: Robot, *, pulleys: bool = False) -> None:
-    """Refuse a robot whose motion does not determine its tensions."""
+    """Refuse robots whose tensions do not follow from their motion."""
     check_moved(robot, pulleys=pulleys)
     if robot.n_cables != robot.dof:
         raise InputError(

@@ -15,11 +15,11 @@ from cspr_jax.numerics.tolerances import UNIT_NORM
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
 
-# Squares of larger lengths lose their meaning; the same number as in `robots.model.point_mass`, which imports jax.
+# The same number as in `robots.model.point_mass`, which imports jax.
 LARGEST_LENGTH = 1e6
-# Points nearer to a plane than this part of their extent lie in it.
+# Points closer to a plane than this fraction of their extent lie in it.
 FLAT = 1e-9
-# Rounding of coordinates of some metres, m.
+# Tolerance of points on a surface, m: rounding of coordinates of some metres.
 WITHIN = 1e-10
 
 
@@ -81,7 +81,7 @@ class Hull:
         offsets: (n_faces,) products of the normals with points of their triangles, m.
         triangles: (n_faces, 3, 3) corners, m.
         edges: (n_edges, 2, 3) ends of the edges, without edges inside of a flat face, m.
-        sides: (n_edges, 2, 3) outward normals of the two faces beside each edge.
+        sides: (n_edges, 2, 3) outward normals of the two faces that meet at each edge.
         name: for people.
     """
 
@@ -137,7 +137,7 @@ def hull(points, *, name: str = "hull") -> Hull:
         raise InputError("points", coordinates.tolist(), "four points or more that are not all in a plane")
     convex = ConvexHull(coordinates)
     corners, normals = convex.simplices, convex.equations[:, :3]
-    # Compute offsets once more from the corners, to whose coordinates they must fit.
+    # Compute offsets again from the corners, so that they fit the coordinates to rounding.
     offsets = np.einsum("fi,fi->f", normals, coordinates[corners].mean(1))
     edges, sides = [], []
     for face, (simplex, others) in enumerate(zip(corners, convex.neighbors, strict=True)):
@@ -157,7 +157,7 @@ def is_flat(points: Float[np.ndarray, "n 3"]) -> bool:
 
 
 def is_within(shape: Body, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-    """Tell whether points belong to a shape, its surface included."""
+    """Tell whether points are inside of a shape or on its surface."""
     if isinstance(shape, Box):
         out = (np.abs((points - shape.centre) @ shape.rotation) - shape.half).max(1)
     else:
@@ -205,7 +205,7 @@ def _radius(radius: float) -> float:
 
 
 def rotation_matrix(quaternion) -> Float[np.ndarray, "3 3"]:
-    """The rotation matrix of a unit quaternion; as `numerics.linear.rotations.matrix`, without jax."""
+    """The rotation matrix of a unit quaternion, like `numerics.linear.rotations.matrix`, but without jax."""
     w, x, y, z = np.asarray(quaternion, float)
     vector = np.array([x, y, z])
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,4 +1,4 @@
-"""Tests whether points of a robot lie on a line, or in a vertical plane. NumPy alone, since files are checked too."""
+"""Tests whether points of a robot lie on a line, or in a vertical plane. NumPy alone, for checks of files."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Bool, Float
 
-# Below this ratio points count as lying on a line, or their plane as vertical.
+# Points lie on a line, or in a vertical plane, if a ratio of areas is below this.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
-# Points nearer to P0 than this part of the radius of the spools count as being at P0; points as near to a line through
-# P0, as being on it.
+# Points closer to P0, or to a line through P0, than this fraction of the radius of the spools count as lying there.
 AT_P0 = 1e-9
 
 
@@ -33,14 +32,14 @@ def is_vertical(points: Float[np.ndarray, "n 3"]) -> bool:
 
 
 def largest_radius(base_points: Float[np.ndarray, "n 3"]) -> float:
-    """Largest distance of a spool from the centroid of all."""
+    """Largest distance of a spool from the centroid of all spools."""
     return float(np.linalg.norm(base_points - base_points.mean(0), axis=1).max())
 
 
 def in_plane(
     base_points: Float[np.ndarray, "n 3"], points: Float[np.ndarray, "k 3"], *, planar: bool = False
 ) -> Bool[np.ndarray, "k"]:
-    """Points that lie in the plane of all spools."""
+    """Tell whether points lie in the spool plane."""
     spools = np.concatenate([base_points, base_points + np.array([0.0, 1.0, 0.0])]) if planar else base_points
     if len(spools) < 3 or is_on_line(spools) or is_vertical(spools):
         return np.zeros(len(points), bool)

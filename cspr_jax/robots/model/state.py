@@ -9,20 +9,20 @@ class State(NamedTuple):
     """Position, orientation and their time derivatives; a point mass has no orientation.
 
     Fields:
-        position: (3,) of the mass centre, m.
+        position: (3,) position of the mass centre, m.
         velocity: (3,) m/s.
         acceleration: (3,) m/s^2.
         rotation: (3, 3) from platform to fixed axes; None for a point mass.
         angular_velocity: (3,) fixed axes, rad/s; None for a point mass.
         angular_acceleration: (3,) fixed axes, rad/s^2; None for a point mass.
-        quaternion: (4,) the rotation as a unit quaternion, scalar first, continuous along a motion; None where it is
-            not needed.
+        quaternion: (4,) rotation as a unit quaternion, scalar first, continuous along a motion; None where it is not
+            needed.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
-    # They are typed as arrays, since platforms always have them.
+    # None by default, for point masses, but typed as arrays, since platforms always have them.
     rotation: Array = None  # type: ignore[assignment]
     angular_velocity: Array = None  # type: ignore[assignment]
     angular_acceleration: Array = None  # type: ignore[assignment]

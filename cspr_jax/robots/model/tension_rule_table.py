@@ -2,14 +2,14 @@
 
 from typing import NamedTuple
 
-CENTRED = "centred"  # rule of plans that name none
+CENTRED = "centred"  # default rule of plans
 
 
 class TensionRule(NamedTuple):
     """A rule that chooses tensions.
 
     Fields:
-        name: as files and callers write it.
+        name: name in files and in calls.
         sentence: description of the tensions that it finds.
         is_bounded: whether every cable needs a largest tension.
         is_exact: whether it finds feasible tensions wherever there are any.

@@ -1,4 +1,4 @@
-"""The force balance of a point mass on three cables, or on two in a plane, in one state."""
+"""The force balance of a point mass on three cables, or on two cables in a plane, in one state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def pseudotensions(
 def adjugate(robot: PointMassRobot) -> tuple[Float[Array, "n_cables 3"], Float[Array, "n_cables 3"]]:
     """Adjugate of the structure matrix M, affine in the position.
 
-    Pseudotensions are (rows + position x arms) (p'' - g).
+    With the two returned arrays, pseudotensions are (rows + position x arms) (p'' - g).
     """
     check_determined(robot)
     a = robot.base_points
@@ -59,6 +59,6 @@ def cable_motion(
 
 
 def _planar_adjugate(rays: Array) -> Array:
-    # Return rows whose products with p'' - g are the numerators of both unknowns by Cramer's rule, in the plane y = 0.
+    # Rows whose products with p'' - g are the numerators of Cramer's rule for both tensions, in the plane y = 0.
     rotated = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
     return jnp.stack([rotated[1], -rotated[0]])

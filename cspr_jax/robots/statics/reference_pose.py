@@ -1,10 +1,10 @@
 """The reference orientation of a platform, and whether it is at rest there, thesis sections 3.4.3 and 3.9.
 
-The plane of the attachment points is level, and the platform is turned about the vertical so that the sum of the
-squares of the level components of the cables is the smallest. The thesis adds up the level components of unit vectors
-along the cables instead. This is the same for the symmetric robots that it treats; elsewhere its minimum can lie where
-the tensions are unequal (NIST RoboCrane at a depth of its spools' radius), while the squares make them equal, (3.14),
-at every depth. The reference orientation is computed, not assumed, and so is the sign of det J.
+The plane of the attachment points is level, and the rotation about the vertical minimises the sum of squares of the
+cables' level components. The thesis minimises the sum of the level components of unit vectors along the cables instead,
+with the same result for the symmetric robots that it treats. For others its minimum can have unequal tensions (NIST
+RoboCrane at a depth of its spools' radius), whereas the squares make tensions equal, (3.14), at every depth. The
+reference orientation is computed, not assumed, and so is the sign of det J.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics import wrench_balance
 
-# Axes that differ less than this from the reference axes count as equal to them.
+# Axes that differ from the reference axes by less than this count as equal to them.
 ALIGNED = 1e-6
 # A cable counts as slack if its tension is a smaller fraction than this of the mean tension.
 SMALLEST_TENSION = 1e-6
@@ -43,13 +43,13 @@ _CHANGE_LOAD = (
 
 
 class Reference(NamedTuple):
-    """A robot at rest.
+    """A robot at rest in its reference orientation.
 
     Fields:
         robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
         rotation: (3, 3) from the axes of the robot file to these platform axes.
         determinant: value of `robots.statics.wrench_balance.normalised_determinant` in P0, whose sign must not change.
-        tensions: (n_cables,) tensions at rest in P0 over their mean.
+        tensions: (n_cables,) tensions at rest in P0, over their mean.
     """
 
     robot: PlatformRobot
@@ -61,9 +61,9 @@ class Reference(NamedTuple):
 def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3"]]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
-    On more cables than degrees of freedom a platform is at rest in many orientations. Its reference orientation is
-    then the one in which its axes are parallel to those of the robot file, and so is that of a platform that does not
-    turn about all axes.
+    A platform on more cables than degrees of freedom can rest in many orientations. Its reference orientation is the
+    one in which its axes are parallel to the axes of the robot file; the same holds for platforms that cannot turn
+    about all axes.
     """
     if robot.n_cables > robot.dof or robot.pattern != "3R3T":
         return robot, np.eye(3)
@@ -91,7 +91,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     if not wrench_balance.is_regular(abs(determinant)):
         error = f"{pose} is singular (determinant {determinant:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
         raise InputError("platform_points", None, _CHANGE_LINES, problem=error + _free(rotated, center))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # tensions may all be zero, or not finite
         fraction = tensions / np.abs(tensions).mean()
     if not (np.isfinite(fraction) & (fraction > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(fraction), fraction, -np.inf)))
@@ -101,7 +101,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
 
 
 def _free(robot: PlatformRobot, center: np.ndarray) -> str:
-    # Find the small motion that changes no cable length, a shift and a rotation, and name its largest part.
+    # Find the small motion (shift and rotation) that changes no cable length, and describe its largest component.
     points = np.asarray(robot.platform_points)
     cables = np.asarray(robot.base_points) - center - points
     along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
@@ -124,7 +124,7 @@ def _standing(robot: PlatformRobot, center: Array) -> tuple[Array, Array]:
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
-    # Lay the platform flat on either side, turned so that its points are nearest to their spools; keep the nearer side.
+    # Lay the platform flat on either side, and turn it so that its points are nearest to the spools; keep the better.
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
@@ -134,7 +134,7 @@ def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
 
 
 def _traced(robot: PlatformRobot) -> Any:
-    # Do the same where jax is tracing the spools, on which only the rotation about the vertical depends.
+    # The same for spools that jax traces: only the rotation about the vertical depends on these.
     points = np.asarray(robot.platform_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     both = []
@@ -152,7 +152,7 @@ def _traced(robot: PlatformRobot) -> Any:
 
 
 def _to_vertical(normal: np.ndarray) -> np.ndarray:
-    # Return the smallest rotation that takes a unit vector to +z.
+    # Smallest rotation that takes a unit vector to +z.
     axis = np.cross(normal, [0.0, 0.0, 1.0])
     sine, cosine = np.linalg.norm(axis), normal[2]
     if sine < ALIGNED:
@@ -161,7 +161,7 @@ def _to_vertical(normal: np.ndarray) -> np.ndarray:
 
 
 def _straightest(points: np.ndarray, base: np.ndarray) -> tuple[float, float]:
-    # Return the torsion with the smallest sum of squares, and how near the points then are: the sum of a . b.
+    # Torsion with the smallest sum of squares, and the sum of a . b with it, which measures how near the points are.
     along = float((points[:, :2] * base[:, :2]).sum())
     across = float((points[:, 0] * base[:, 1] - points[:, 1] * base[:, 0]).sum())
     nearness = math.hypot(along, across)

@@ -1,14 +1,15 @@
 """Sensitivity of an effector to errors of its cable lengths, Machines 11 (2), 2023, 224, (7), at one position.
 
-Let K be the matrix from velocity and angular velocity to the rates of the cable lengths, one row (e, b x e) a cable; a
-small error d rho of the lengths then moves the effector by K^-1 d rho. The largest displacement for errors up to one
-unit in each cable is the induced norm (infinity, 2) of the upper rows of K^-1, sigma_p; the largest rotation is that of
-the lower rows, sigma_r. A norm is convex, so that its largest value over the cube of errors lies at a corner: the
-maximum over all signs is exact. (J in the paper has the other sign in its lower rows, which changes no norm.)
+Let K be the matrix from velocity and angular velocity to the rates of the cable lengths, with one row (e, b x e) for
+each cable; a small error d rho of the lengths moves the effector by K^-1 d rho. The largest displacement by errors of
+up to one unit in each cable, sigma_p, is the induced norm (infinity, 2) of the upper rows of K^-1; the largest
+rotation, sigma_r, is that norm of the lower rows. A norm is convex, so that its maximum over the cube of errors lies at
+a corner: the maximum over all signs is exact. (J in the paper has the other sign in its lower rows, which changes no
+norm.)
 
-No sigma_p is below d / sqrt(n) for n cables and d translations: the mean square over the corners is the squared
-Frobenius norm of the upper rows, which for an inverse of n unit vectors e is at least d^2 / n. So sigma_p is at least
-sqrt 3 with three cables, and only cables at right angles reach this.
+For n cables and d translations sigma_p is at least d / sqrt(n): the mean square over the corners is the squared
+Frobenius norm of the upper rows, which for an inverse of n unit vectors e is at least d^2 / n. With three cables
+sigma_p is thus at least sqrt 3, a value that only cables at right angles attain.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Sensitivities(NamedTuple):
 
     Fields:
         sigma_p: () largest displacement over the largest error of a cable, m/m.
-        sigma_r: () largest rotation of a platform over that error, rad/m; NaN for a point mass.
+        sigma_r: () largest rotation of a platform over the largest error of a cable, rad/m; NaN for a point mass.
     """
 
     sigma_p: Array
@@ -44,7 +45,7 @@ class Sensitivities(NamedTuple):
 def sensitivities(
     robot: Robot, position: Float[Array, "3"], rotation: Float[Array, "3 3"] | None = None
 ) -> Sensitivities:
-    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all lengths independent."""
+    """Sensitivities of a robot with as many cables as degrees of freedom, for independent errors of all lengths."""
     check_determined(robot)
     rotation = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
     rates = -robot.wrench_matrix(at_rest(position, rotation)).T
@@ -57,7 +58,7 @@ def sensitivities(
 def pair_sensitivities(
     exit_points: Float[Array, "3 3"], along: Float[Array, "3 3"], radius: Float[Array, ""], position: Float[Array, "3"]
 ) -> Sensitivities:
-    """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2)."""
+    """Sensitivities of a platform on three parallel pairs of cables in closed form, (A1) and (A2)."""
     cables = position[None] - exit_points
     units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
     translation, first = solved(units, jnp.eye(_TRANSLATIONS))
@@ -72,7 +73,7 @@ def _of_inverse(translations: Array, rotations: Array, determinant: Array) -> Se
 
 
 def _largest(rows: Array) -> Array:
-    # Opposite corners give the same length, so that the last sign can stay.
+    # Opposite corners give the same length, so that the last sign is kept.
     count = rows.shape[1]
     signs = np.array([(*corner, 1.0) for corner in itertools.product((-1.0, 1.0), repeat=count - 1)])
     return jnp.max(jnp.linalg.norm(signs @ rows.T, axis=1))

@@ -1,4 +1,4 @@
-"""Rotations about the vertical and mirror planes that leave a platform robot unchanged: tried, not assumed."""
+"""Rotations about the vertical and mirror planes that leave a platform robot unchanged, found by trying them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.platform import PlatformRobot
 
 LARGEST_FOLD = 6
-# Points nearer to each other than this part of the robot's largest coordinate are the same.
+# Points closer together than this fraction of the robot's largest coordinate are the same.
 SAME = 1e-9
 ANGLE_ERROR = 1e-9
 KEY_DIGITS = 9
 
 
 class Symmetries(NamedTuple):
-    """Symmetries that leave a robot unchanged, but for the order of its cables.
+    """Symmetries that leave a robot unchanged except for the order of its cables.
 
     Fields:
         fold: largest k for which a rotation by 2 pi / k about the vertical through the centroid is a symmetry.
@@ -49,7 +49,7 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
 
 
 def folded(symmetry: Symmetries, azimuths: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Azimuths that represent all others at which the robot can do the same."""
+    """For each azimuth, the equivalent one that represents all azimuths at which the robot behaves alike."""
     width = 2.0 * math.pi / symmetry.fold
     images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in symmetry.mirrors)]), width)
     return np.where(width - images < ANGLE_ERROR, 0.0, images).min(0)
@@ -58,12 +58,12 @@ def folded(symmetry: Symmetries, azimuths: Float[np.ndarray, "n"]) -> Float[np.n
 def alike(
     symmetry: Symmetries, positions: Float[np.ndarray, "n m"], angles: Float[np.ndarray, "n 3"]
 ) -> Int[np.ndarray, "n"]:
-    """Orientations that represent others: at a position on a mirror plane, the plane joins orientations in pairs."""
+    """Orientations that represent others: at positions on a mirror plane, orientations are equivalent in pairs."""
     azimuths, stands = np.arctan2(positions[:, 1], positions[:, 0]), np.arange(len(positions))
     mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ANGLE_ERROR).any(1))
     if not len(mirrored):
         return stands
-    # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.
+    # Mirroring reverses rotations, so that phi becomes pi - phi, and sigma -sigma.
     both = np.concatenate([angles[mirrored], np.array([math.pi, 0.0, 0.0]) + angles[mirrored] * [-1.0, 1.0, -1.0]])
     units = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
     rounded = (
@@ -80,7 +80,7 @@ def _mirror(azimuth: float) -> np.ndarray:
 
 
 def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:
-    # Tell whether the changed robot has the same cables and the same inertia.
+    # Tell whether the rotated or mirrored robot has the same cables and the same inertia.
     base, points = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     cables = np.concatenate([base, points], axis=1)
     other = np.concatenate([base @ change.T, points @ change.T], axis=1)

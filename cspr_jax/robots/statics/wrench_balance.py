@@ -13,7 +13,7 @@ from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.cable_lengths import moved_lengths
 
-# Normalised determinants up to this count as singular, since rounding may decide their sign.
+# Normalised determinants up to this magnitude count as singular, since rounding may decide their sign.
 SINGULAR = 1e-6
 
 
@@ -46,14 +46,14 @@ def normalised_determinant(
 
 
 def is_regular(determinant):
-    """Tell whether cables can carry every wrench: the rule that decides which poses are singular."""
+    """Tell whether cables can carry every wrench, so that a pose is not singular."""
     return determinant > SINGULAR
 
 
 def determinant_ratio(
     robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
 ) -> Float[Array, ""]:
-    """Normalised determinant over its value in the reference orientation at the same depth in the middle."""
+    """Normalised determinant over its value in the reference orientation at the same depth below the centroid."""
     middle = rest_point(plane_normal(robot) @ position)
     return normalised_determinant(robot, position, rotation) / normalised_determinant(robot, middle, jnp.eye(3))
 

@@ -17,15 +17,15 @@ from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot,
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 
-CABLES = 6  # the number for which the adjugates and Laplace's expansion here are written
+CABLES = 6  # the only number of cables that the formulas of this module are written for
 
 
 class CableLanes(NamedTuple):
     """Positions of the cables, one entry a cable.
 
     Fields:
-        arms: from the mass centre to the attachment points, fixed axes, m.
-        rays: from spool to attachment point, m.
+        arms: vectors from the mass centre to the attachment points, fixed axes, m.
+        rays: vectors from the spools to the attachment points, m.
     """
 
     arms: Sequence[Vector]
@@ -33,7 +33,7 @@ class CableLanes(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """The tensions per mass and length as fractions.
+    """Tensions per mass and length as fractions.
 
     Fields:
         numerators: six numerators of mu.
@@ -92,12 +92,12 @@ def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     odd = [dot(row, rest) for row in inner]
     even = [top[j] * determinant - sum(g[j][n] * odd[n] for n in range(3)) for j in range(3)]
     numerators = [x for pair in zip(even, [d * x for x in odd], strict=True) for x in pair]
-    # The order of the cables in two groups is an odd permutation.
+    # Sorting the cables into two groups is an odd permutation, which changes the sign.
     return Balance(numerators, d * determinant, -determinant, d)
 
 
 def determinant(cables: CableLanes) -> Float[Array, "..."]:
-    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the moments of the other three."""
+    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the other three moments."""
     moments = [cross(arm, ray) for arm, ray in zip(cables.arms, cables.rays, strict=True)]
     total = jnp.zeros(())
     for three in itertools.combinations(range(CABLES), 3):

@@ -1,9 +1,9 @@
-"""Sets of wrenches that cables can give, as faces: for any number of cables, and two, three or six components.
+"""Sets of wrenches that cables can supply, by their faces: for any number of cables, and two, three or six components.
 
 With tensions between smallest and largest values the wrenches W t fill a zonotope; without largest tensions, a cone.
-Every face is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1 columns are
-candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
-Krut 2010). A candidate bounds nothing where a cable without a largest tension pulls beyond it.
+Every face is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1 columns, with both
+signs, are candidates for its normal (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
+Krut 2010). A candidate is no face where a cable without a largest tension can pull beyond it.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_ac
 from cspr_jax.robots.model.robot import Robot
 from cspr_jax.robots.model.state import State
 
-# Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
+# Columns are unit vectors: d - 1 with a volume below this span no face; a column this near to a plane lies in it.
 FLAT = 1e-12
-# Rounding of a slack, over the magnitude of the numbers of which it is the difference; to be divided by the volume of
-# the face's columns.
+# Rounding error of a slack, over the magnitude of the numbers whose difference it is, times the volume of the face's
+# columns.
 SLACK_ERROR = 1e-14
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Faces:
-    """Set of feasible wrenches, or of accelerations: where no slack is negative.
+    """Set of the wrenches, or accelerations, that are feasible: those for which no slack is negative.
 
     Fields:
-        normals: (..., n_faces, n_components) unit normals that point inside; 0 for a face that bounds nothing.
-        offsets: (..., n_faces) N or m/s^2; -inf for a face that bounds nothing.
+        normals: (..., n_faces, n_components) unit normals that point inside; 0 for a candidate that is no face.
+        offsets: (..., n_faces) products of the normals with points of the faces, N or m/s^2; -inf for no face.
         volumes: (..., n_faces) volume of the unit columns that span the face, in [0, 1].
-        apex: (..., n_components) wrench, or acceleration, of the smallest tensions.
-        of_largest: (..., n_faces) whether a largest tension is reached on the face.
+        apex: (..., n_components) wrench, or acceleration, at the smallest tensions.
+        of_largest: (..., n_faces) whether a cable is at its largest tension on the face.
         is_regular: (...) whether the set has an inside: the cables span all d components.
-        closure: (...) margin of wrench closure, in [-1, 1], positive if the cables, pulled hard enough, resist every
-            wrench: how far columns reach beyond a plane of d - 1 unit columns, minimum over both sides of all planes.
+        closure: (...) margin of wrench closure, in [-1, 1], positive if large enough tensions resist every wrench: the
+            largest component of a column beyond a plane of d - 1 unit columns, minimum over both sides of all planes.
     """
 
     normals: Array
@@ -74,7 +74,7 @@ class Faces:
         each = SLACK_ERROR * (magnitude + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
         finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
         smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
-        # A face counts if it may be the nearest one.
+        # Only faces that may be the nearest one matter.
         each = each / jnp.where(finite, self.volumes, 1.0)
         near = finite & (self.slacks(values) - each <= smallest + each)
         return jnp.max(jnp.where(near, each, 0.0), axis=-1)
@@ -87,9 +87,9 @@ def _subsets(count: int, n: int) -> np.ndarray:
 
 @functools.cache
 def _level(rows: int, columns: int, n: int) -> tuple[np.ndarray, ...]:
-    # Return how minors of `n` columns follow from those of n - 1 by expansion along the last column: for each choice of
-    # columns, the choice without its last one, and that last one; for each choice of rows, each of its rows, the choice
-    # of the other rows, and the sign, (n_choices, n) each.
+    # Indices for expanding minors of `n` columns along their last column: for each choice of columns, the choice
+    # without the last one, and the last one; for each choice of rows, each of its rows, the choice of the other rows,
+    # and the sign, (n_choices, n) each.
     smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, n - 1).tolist())}
     chosen = _subsets(columns, n)
     parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
@@ -108,19 +108,19 @@ def spanning(count: int, dof: int) -> np.ndarray:
 def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices dof"]:
     """Normals to all choices of d - 1 columns: their generalised cross products."""
     dof, count = matrix.shape
-    products = matrix.T  # minors of one column, by row
+    products = matrix.T  # minors of one column, indexed by row
     for n in range(2, dof):
         parent, last, row, rest, sign = _level(dof, count, n)
         terms = products[parent][:, rest] * matrix.T[last][:, row]
         products = terms @ sign
-    # The first of `_subsets` leaves out the last row, and so on.
+    # The first of `_subsets` leaves out the last row, the second the last but one, and so on.
     signs = np.array([(-1.0) ** (dof - 1 - i) for i in range(dof)])
     return products[:, ::-1] * signs[None]
 
 
 @functools.cache
 def beside_faces(count: int, dof: int) -> np.ndarray:
-    """Cables that do not span a face."""
+    """Cables that are not among those that span a face, for each face."""
     return np.array([np.setdiff1d(np.arange(count), columns) for columns in spanning(count, dof)])
 
 
@@ -129,8 +129,7 @@ def one_sided_faces(
 ) -> Float[Array, "n_choices n_others"]:
     """Products of a normal to each choice of d - 1 cables with the other cables.
 
-    With up to two cables more than degrees of freedom they follow from the kernel, in some thirty multiplications
-    instead of determinants.
+    With up to two redundant cables they follow from the kernel by some thirty multiplications, without determinants.
     """
     dof, count = matrix.shape
     chosen = beside_faces(count, dof)
@@ -139,7 +138,7 @@ def one_sided_faces(
         norm = jnp.linalg.norm(normals, axis=1)[:, None]
         along = jnp.take_along_axis(normals / jnp.where(norm > FLAT, norm, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
         return jnp.where((norm > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
-    # The other cables' rows of the kernel are one more than it has columns: their linear relation has the products.
+    # The other cables' rows of the kernel number one more than its columns: the products are their linear relation.
     rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
         return jnp.ones(chosen.shape)
@@ -156,7 +155,7 @@ def one_sided_faces(
 def face_distances(
     along: Float[Array, "n m"], slacks: Float[Array, "n"], weights: Float[Array, "n m"]
 ) -> Float[Array, "n"]:
-    """How far tensions lie within limits that shrink until a face is reached."""
+    """Amount by which all limits can shrink until a wrench lies on the face, for each face."""
     norms = jnp.sum(jnp.abs(along) * weights, axis=1)
     return jnp.where(norms > 0.0, slacks / jnp.where(norms > 0.0, norms, 1.0), jnp.inf)
 
@@ -165,9 +164,9 @@ def face_distances(
 def wrench_faces(
     matrix: Float[Array, "dof n_cables"], tension_min: Float[Array, "n_cables"], tension_max: Float[Array, "n_cables"]
 ) -> Faces:
-    """Faces of the set of wrenches that cables can give."""
+    """Faces of the set of wrenches that cables can supply."""
     dof, count = matrix.shape
-    # A cable that ends in its own spool has no direction.
+    # A cable of length zero has no direction.
     has_directions = jnp.isfinite(matrix).all()
     matrix = jnp.where(jnp.isfinite(matrix), matrix, 0.0)
     products = normals_to(matrix)
@@ -196,7 +195,7 @@ def wrench_faces(
 
 
 def _offset(along: Array, low: Array, high: Array) -> Array:
-    # Return the smallest product of each normal with a wrench of the set.
+    # Smallest product of each normal with a wrench of the set.
     return jnp.sum(along * jnp.where(along > 0.0, low[None], jnp.where(along < 0.0, high[None], 0.0)), axis=1)
 
 
@@ -216,12 +215,12 @@ def acceleration_faces(
     else:
         normals, apex = faces.normals, faces.apex
     falling = -relative_acceleration(robot, zero)
-    # A face that bounds nothing keeps its -inf.
+    # A candidate that is no face keeps its -inf.
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 
 
 def tension_range(robot: Robot, limits: Limits) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]]:
-    """Smallest and largest tension of each cable; NumPy arrays where nothing is traced."""
+    """Smallest and largest tension of each cable; NumPy arrays unless jax traces them."""
     is_traced = any(isinstance(array, jax.core.Tracer) for array in jax.tree.leaves((robot, limits)))
     xp = jnp if is_traced else np
     low = as_float64(0.0 if limits.tension_min is None else limits.tension_min)

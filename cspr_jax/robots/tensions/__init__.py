@@ -1,1 +1,1 @@
-"""Tensions of redundant cables: those of least norm, rules that choose among them, and linear programs."""
+"""Tensions of redundant cables: of least norm or by other rules, and linear programs to compare with."""

@@ -1,8 +1,8 @@
 """The face of the set of wrenches that is nearest to a wrench, and the tensions that are most central there.
 
-A face's d - 1 cables span it; where tensions are as far from their limits as the face allows, the n - d + 1 others all
-have the same distance r from a limit. With tensions t0 + N^T x, N without a wrench, these cables and r obey
-N_S^T x - sign r = limit_S - t0_S, one small system.
+A face is spanned by d - 1 cables; where tensions are as far from their limits as the face allows, the n - d + 1 other
+cables S all have the same distance r from a limit. With tensions t0 + N^T x, where rows of N give no wrench, x and r
+follow from N_S^T x - sign r = limit_S - t0_S, one small system.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import beside_faces, face_distances, one_sided_faces, spanning
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
 
-# Cables without a largest tension get a limit of so many times the largest tension that the wrench needs.
+# Cables without a largest tension get this multiple of the largest tension that the wrench needs as a limit.
 CAP = 1e3
 
 
@@ -26,7 +26,7 @@ class NearestFace(NamedTuple):
     """Nearest face of one balance.
 
     Fields:
-        along: (n_cables,) products of a normal that points inside with the cables; 0 for those that span the face.
+        along: (n_cables,) products of the inward normal with the cables' columns; 0 for cables that span the face.
         columns: (dof - 1,) cables that span the face.
         tensions: (n_cables,) most central tensions, N.
     """
@@ -42,19 +42,19 @@ def nearest_face(
     low: Float[Array, "n_cables"],
     high: Float[Array, "n_cables"],
 ) -> NearestFace:
-    """Find the nearest face."""
+    """Find the face nearest to a wrench, and the most central tensions."""
     dof, count = matrix.shape
     solutions = all_tensions(matrix, wrench)
     cap = CAP * (jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(low))
     low, high = jnp.asarray(low), jnp.minimum(high, jnp.maximum(cap, low))
     chosen = beside_faces(count, dof)
     along = one_sided_faces(matrix, solutions.kernel)
-    # Faces of both signs, each cable at the limit that gives the least.
+    # Faces of both signs, with each cable at the limit that makes its product smallest.
     along, others = jnp.concatenate([along, -along]), np.concatenate([chosen, chosen])
     limits = jnp.where(along > 0.0, low[others], high[others])
     slacks = jnp.sum(along * (solutions.min_norm[others] - limits), axis=1)
     span = high - low
-    # If the range of one cable is the limit, each cable is as far from limits as its own range allows.
+    # If the range of a cable, and not a face, bounds the distance, distances are proportional to the cables' ranges.
     weights = jnp.where(
         jnp.min(face_distances(along, slacks, jnp.ones(along.shape))) > 0.5 * jnp.min(span), span / jnp.max(span), 1.0
     )

@@ -30,8 +30,8 @@ def tension_couples(
 ) -> Float[Array, "n_cables"]:
     """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
 
-    A couple is the force of two cables whose spools are the ends of a side, as seen along that side, where both lie in
-    one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples make up the force.
+    A couple is the force of two cables whose spools are the ends of a side, projected along that side, so that both lie
+    on one line. Unlike tensions, couples follow from the motion alone: any two opposite couples add up to the force.
     """
     spools = robot.base_points
     force = robot.mass * relative_acceleration(robot, acceleration)

@@ -1,11 +1,11 @@
-"""Tensions of a robot with more cables than it needs, in one state: the least ones, or the farthest from limits.
+"""Tensions of a robot with redundant cables, in one state: those of least norm, or the farthest from their limits.
 
-All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an orthonormal basis of tensions without a
-wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
-(d + 1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0,
-and the points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again
-and again, as in the improved closed form of Pott (2013). Here a fixed limit is released if its multiplier becomes
-negative (Goldfarb and Idnani 1983), so that the answer is exact: if none is found, none exists.
+All tensions that give a wrench are t = t0 + N^T x, with t0 of least norm and the rows of N an orthonormal basis of
+tensions that give no wrench, so that the tensions of least norm within limits have the shortest feasible x. With one or
+two components of x (d + 1 or d + 2 cables) this is the feasible point nearest to 0 among 0 itself, the point of each
+limit's line nearest to 0, and the intersections of two such lines. With more components, the limit that is exceeded
+most is fixed, one after the other, as in the improved closed form of Pott (2013); but a fixed limit is released if its
+multiplier becomes negative (Goldfarb and Idnani 1983), so that the result is exact: if none is found, none exists.
 
 The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
 """
@@ -27,12 +27,11 @@ from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
 
-WITHIN = TOUCHED  # over the largest tension, by which a limit may be broken and counts as kept
-TENSION_ERROR = 1e-11  # the same where candidates for the answer are compared
-# A unit vector depends on others if its component normal to them is shorter than this.
+WITHIN = TOUCHED  # largest violation of a limit that counts as kept, over the largest tension
+TENSION_ERROR = 1e-11  # the same for comparing candidates
+# A unit vector depends linearly on others if its component normal to them is shorter than this.
 DEPENDENT = 1e-10
-# Largest number of steps of the search for the limits that are reached, over the number of cables; random cases take
-# fewer than two.
+# Largest number of steps of the search for active limits, over the number of cables; random cases take fewer than two.
 LONGEST = 10
 
 
@@ -40,8 +39,8 @@ class Distribution(NamedTuple):
     """Tensions of all cables in one state.
 
     Fields:
-        tensions: (n_cables,) N. Where none are feasible, or a rule finds none that are, the tensions of least norm,
-            whatever the limits. They may not be finite where the cables do not span all components of a wrench.
+        tensions: (n_cables,) N. Where no tensions are feasible, or a rule finds none, those of least norm without
+            limits. They may not be finite where the cables do not span all components of a wrench.
         residual: () length of W t - w, over 1 + the length of w.
         is_within: () whether all limits are kept, to 1e-9 of the largest tension, and W has full rank.
     """
@@ -56,7 +55,7 @@ class AllTensions(NamedTuple):
 
     Fields:
         min_norm: (n_cables,) tensions of least norm, N.
-        kernel: (n_free, n_cables) orthonormal rows of tensions without a wrench, one for each cable more than needed.
+        kernel: (n_free, n_cables) orthonormal rows of tensions that give no wrench, one for each redundant cable.
         is_regular: () whether the cables span all components of a wrench.
     """
 
@@ -65,7 +64,7 @@ class AllTensions(NamedTuple):
     is_regular: Array
 
     def tensions(self, point: Float[Array, "m"]) -> Float[Array, "n_cables"]:
-        """Tensions of one x."""
+        """Tensions of a given x."""
         return self.min_norm + point @ self.kernel
 
 
@@ -76,7 +75,7 @@ def least_norm(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Distribution:
-    """The least tensions within limits."""
+    """Tensions of least norm within limits."""
     solutions = all_tensions(matrix, wrench)
     tensions = solutions.tensions(_shortest(solutions, tension_min, tension_max))
     return checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
@@ -89,7 +88,7 @@ def centred(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> tuple[Distribution, Array]:
-    """The tensions that are farthest from their limits; among these the least."""
+    """The tensions that are farthest from their limits; among these, those of least norm."""
     solutions = all_tensions(matrix, wrench)
     largest = _largest_distance(matrix, tension_min, tension_max, solutions)
     inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
@@ -120,7 +119,7 @@ def keeps(
 
 
 def beyond(tensions: Float[Array, "..."], low: Float[Array, "..."], high: Float[Array, "..."]) -> Float[Array, "..."]:
-    """How far tensions are below their smallest; negative: above their largest."""
+    """Signed violation: by how much tensions are below their smallest value (positive) or above their largest."""
     return jnp.maximum(low - tensions, 0.0) - jnp.maximum(tensions - high, 0.0)
 
 
@@ -136,7 +135,8 @@ def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof
 def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
     """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths before scaling.
 
-    By Gram and Schmidt, the longest vector first: the rows of W, then unit vectors, whose products have no meaning.
+    By Gram and Schmidt, always with the longest vector left: of the rows of W, then of unit vectors, whose products
+    have no meaning.
     """
     dof, count = matrix.shape
     is_row = np.arange(dof + count) < dof
@@ -145,7 +145,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
         rest, products, frame, along = carry
         square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
         index = jnp.argmax(square)
-        # Subtract the components along the other rows that rounding has left.
+        # Subtract the components along other rows once more, since rounding has left some.
         again = frame @ rest[index]
         vector = rest[index] - again @ frame
         length = jnp.linalg.norm(vector)
@@ -162,7 +162,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
 
 
 def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
-    """The shortest x (r,) within limits; where there is none, an x that is not far beyond them."""
+    """The shortest x (r,) within limits; where there is none, an x that exceeds them little."""
     freedom = solutions.kernel.shape[0]
     if freedom == 0:
         return jnp.zeros(0)
@@ -172,7 +172,7 @@ def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
     tensions = solutions.min_norm[None] + points @ solutions.kernel
     excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
     is_within = is_point & (excess <= TENSION_ERROR * jnp.max(jnp.abs(tensions), axis=1))
-    # If the limits leave only one point, rounding can leave none.
+    # If only one point is feasible, rounding may exclude it: then take the smallest violation.
     worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
 
@@ -201,16 +201,16 @@ def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array,
 
 @functools.cache
 def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
-    # Return the pairs of limits of two different cables, among 2n limits, the smallest tensions first.
+    # Pairs of limits of two different cables, by index among 2n limits, of which smallest tensions come first.
     pairs = [pair for pair in itertools.combinations(range(2 * count), 2) if (pair[1] - pair[0]) % count]
     return np.array(pairs)[:, 0], np.array(pairs)[:, 1]
 
 
 class _ActiveSet(NamedTuple):
-    # State of the search for the limits that the shortest x reaches. At each step x = multipliers @ kernel.T is the
-    # shortest for some limits.
+    # State of the search for the active limits of the shortest x. At each step x = multipliers @ kernel.T is the
+    # shortest x for some of the limits.
     point: Array  # (r,)
-    multipliers: Array  # (n,) with the signs of `sides`, and of the limit sought
+    multipliers: Array  # (n,) with the signs of `sides`, and of the sought limit
     sides: Array  # (n,) 1 held at its smallest tension, -1 at its largest, 0 free
     sought: Array  # () the cable whose limit is next
     is_seeking: Array  # ()
@@ -219,7 +219,7 @@ class _ActiveSet(NamedTuple):
 
 
 def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
-    """Limits that the shortest x reaches, (n,): 1 the smallest tension, -1 the largest, 0 none."""
+    """Active limits of the shortest x, (n,): 1 the smallest tension, -1 the largest, 0 none."""
     solutions, low, high = lax.stop_gradient((solutions, low, high))
     freedom, count = solutions.kernel.shape
 
@@ -230,14 +230,14 @@ def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
     none, no = jnp.zeros(count), jnp.asarray(False)
-    # Tensions that are not finite are never within limits.
+    # Tensions that are not finite cannot be brought within limits.
     is_lost = ~(jnp.isfinite(solutions.min_norm).all() & jnp.isfinite(solutions.kernel).all())
     start = _ActiveSet(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
     return lax.while_loop(is_open, lambda search: _step(solutions, low, high, search), start).sides
 
 
 def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
-    """Step towards the limit that is sought, until it is reached or a fixed limit must be released."""
+    """One step towards the sought limit, until it is reached or a fixed limit must be released."""
     excess = beyond(solutions.tensions(search.point), low, high)
     sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
     is_sought = jnp.arange(excess.size) == sought
@@ -268,7 +268,7 @@ def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -
 
 
 def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) -> Array:
-    # Return the shortest x at which the tensions with a side are at their limits.
+    # Shortest x at which all tensions whose side is not 0 are at their limits.
     limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
     offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.min_norm)
     return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
@@ -280,7 +280,7 @@ def projected(
     vector: Float[Array, "m"],
     products: Float[Array, "n_cables"],
 ) -> tuple[Float[Array, "m"], Float[Array, "n_cables"]]:
-    """The vector nearest to another one that has given products with columns of the kernel."""
+    """The vector nearest to a given one that has prescribed products with the held columns of the kernel."""
     freedom = kernel.shape[0]
     held = jnp.where(is_held[None], kernel, 0.0)
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
@@ -291,20 +291,20 @@ def projected(
 
 
 def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
-    """Largest r, () N: the smallest of half the range of each cable, and of each face's slack over its loss per r."""
+    """Largest distance r from limits, () N: the minimum of half of each cable's range and of what each face allows."""
     dof, count = matrix.shape
     if count == dof:
         return jnp.min(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))
     others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
 
     def slack(along, cables):
-        # A cable without a largest tension pulls beyond the face: its slack is infinite.
+        # The slack is infinite where a cable without a largest tension can pull beyond the face.
         reached = jnp.where(along < 0.0, high[cables], low[cables])
         return jnp.sum(along * (solutions.min_norm[cables] - reached), axis=-1)
 
     both, cables = jnp.concatenate([products, -products]), np.concatenate([others, others])
     each = lax.stop_gradient(face_distances(both, slack(both, cables), jnp.ones(both.shape)))
-    # Compute the distance from the nearest face once more, now differentiable: infinite limits must not appear in it.
+    # Compute the distance from the nearest face again, differentiably, without infinite limits.
     nearest = jnp.argmin(each)
     is_face = jnp.isfinite(each[nearest])
     along = jnp.where(is_face, both[nearest], 0.0)

@@ -1,8 +1,9 @@
-"""The least tensions within limits of many poses, one lane a pose: the fast form of `tension_distribution.least_norm`.
+"""Tensions of least norm within limits, one lane a pose: the fast form of `tension_distribution.least_norm`.
 
-It serves robots with one or two cables more than components. All tensions are t0 + N^T x, by Gram and Schmidt, each row
-twice. The shortest feasible x is 0, or lies on the line where one cable is at a limit, as near to 0 as the other cables
-allow: on each line they leave an interval, whose point nearest to 0 is a foot of the line or a point where lines meet.
+It serves robots with one or two redundant cables. All tensions are t0 + N^T x, by Gram and Schmidt with each row
+orthogonalised twice. The shortest feasible x is 0, or lies on the line where one cable is at a limit, as near to 0 as
+the other cables allow: on each line they leave an interval, whose point nearest to 0 is either the point of the line
+nearest to 0 or an end of the interval.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from cspr_jax.robots.tensions.tension_distribution import TENSION_ERROR, WITHIN,
 
 Lanes = Sequence[Array]
 
-# Numbers of components of x that are treated here.
+# Numbers of redundant cables that this form serves.
 FREE = (1, 2)
-# Poses of a batch on a CPU, whose some hundred arrays fit a cache.
+# Number of poses of a batch on a CPU, so that some hundred arrays fit into a cache.
 BATCH = 4096
-# The slow form decides if the component of some row of a wrench matrix normal to the others is shorter than this part
-# of the longest.
+# The slow form decides if, of the components of rows of a wrench matrix normal to the other rows, the shortest is less
+# than this fraction of the longest.
 UNCERTAIN = 1e-5
 
 
@@ -41,7 +42,7 @@ def _dot(a: Lanes, b: Lanes) -> Array:
 
 
 def _normal_part(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, Lanes]:
-    """Component of a vector normal to unit vectors, and its products with them; computed twice, against rounding."""
+    """Component of a vector normal to unit vectors, and its products with them; done twice against rounding errors."""
     total: Lanes = [jnp.zeros_like(vector[0])] * len(units)
     for _ in range(2):
         products = materialized([_dot(vector, unit) for unit in units], one)
@@ -53,8 +54,8 @@ def _normal_part(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lan
 
 @jax.jit
 def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array], list[list[Array]], Array]:
-    # Take matrix (dof, n_cables, n) and wrench (dof, n); return t0, N, and the shortest normal component of a row over
-    # the longest.
+    # From matrix (dof, n_cables, n) and wrench (dof, n): t0, N, and the shortest normal component of a row over the
+    # longest.
     dof, count = matrix.shape[:2]
     units: list[Lanes] = []
     along: list[Array] = []
@@ -69,7 +70,7 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
     min_norm = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
     kernel: list[list[Array]] = []
     for _ in range(count - dof):
-        # Take the cable whose unit vector has the longest component normal to the rows so far.
+        # Continue with the cable whose unit vector has the longest component normal to all rows so far.
         rest = [1.0 - _dot(column, column) for column in ([unit[k] for unit in units] for k in range(count))]
         index, maximum = jnp.zeros_like(rest[0]), rest[0]
         for k, value in enumerate(rest[1:], 1):
@@ -86,14 +87,14 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
 
 
 def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Array) -> tuple[Array, Array]:
-    """Ends of the interval of s in which values + s * rates keep limits, in reverse order where it is empty."""
+    """Ends of the interval of s in which values + s * rates keep limits; where it is empty the first is the larger."""
     first, last = jnp.full_like(values[0], -jnp.inf), jnp.full_like(values[0], jnp.inf)
     for value, rate, minimum, maximum in zip(values, rates, low, high, strict=True):
         moves = jnp.abs(rate) > FLAT
         inverse = 1.0 / jnp.where(moves, rate, 1.0)
         to_least, to_most = (minimum - rounding - value) * inverse, (maximum + rounding - value) * inverse
         near, far = nan_ignoring_min(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
-        # A tension with rate zero keeps its limits everywhere or nowhere.
+        # A tension whose rate is zero keeps its limits for all s or for none.
         is_kept = (value >= minimum - rounding) & (value <= maximum + rounding)
         near, far = jnp.where(moves, near, -jnp.inf), jnp.where(moves | is_kept, far, -jnp.inf)
         far = jnp.where(moves | ~is_kept, far, jnp.inf)
@@ -102,13 +103,13 @@ def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Ar
 
 
 def _nearest(first: Array, last: Array) -> Array:
-    # Return the point of an interval that is nearest to 0.
+    # Point of an interval that is nearest to 0.
     return jnp.where(first > 0.0, first, jnp.where(last < 0.0, last, 0.0))
 
 
 @jax.jit
 def _on_line(min_norm: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, magnitude: Array) -> Array:
-    # Return the shortest x with the first cable at a limit, as a complex number; not finite where there is none.
+    # Shortest x with the first cable at a limit, as a complex number; not finite where there is none.
     (a, *others), (b, *more) = kernel
     square = a * a + b * b
     inverse = 1.0 / jnp.where(square > FLAT**2, square, 1.0)
@@ -128,7 +129,7 @@ def _on_line(min_norm: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, 
 
 @jax.jit
 def _in_interval(min_norm: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, magnitude: Array) -> Array:
-    # Return the shortest x of one component.
+    # Shortest x of one component.
     first, last = _interval(min_norm, kernel[0], low, high, TENSION_ERROR * magnitude)
     along = jnp.where(first <= last, _nearest(first, last), jnp.inf)
     return lax.complex(along, jnp.zeros_like(along))
@@ -208,7 +209,7 @@ def least_norms(
     low: Float[np.ndarray, "n n_cables"],
     high: Float[np.ndarray, "n n_cables"],
 ) -> tuple[Distribution, np.ndarray]:
-    """The least tensions within limits of many poses."""
+    """Tensions of least norm within limits, of many poses."""
 
     def one(part: slice):
         arrays = tuple(x[part] for x in (matrices, wrenches, low, high))

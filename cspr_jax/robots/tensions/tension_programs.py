@@ -1,4 +1,4 @@
-"""Verdicts of poses by linear programs and by least squares: slow and general, to compare with; no jax."""
+"""Verdicts of poses by linear programs and by least squares: slow and general, for comparisons; no jax."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 
-# Error of a residual over the right-hand side.
+# Largest residual of a solution, over the right-hand side.
 CLOSE = 1e-6
 
 
@@ -16,7 +16,7 @@ def by_program(
     low: Float[np.ndarray, "n_cables"] | None,
     high: Float[np.ndarray, "n_cables"] | None,
 ) -> bool:
-    """Tell if tensions supply a wrench, by a linear program (HiGHS): the largest s with low + s <= t <= high - s."""
+    """Tell if tensions can supply a wrench, by a linear program (HiGHS) for the largest s, low + s <= t <= high - s."""
     from scipy.optimize import linprog  # takes long to import, and is rarely needed
 
     dof, count = matrix.shape
@@ -31,7 +31,7 @@ def by_program(
         b_ub=limits[is_finite],
         A_eq=np.c_[matrix, np.zeros(dof)],
         b_eq=wrench,
-        # Without largest tensions s may have no bound: give it one.
+        # Without largest tensions s may be unbounded: give it a bound.
         bounds=[*[(None, None)] * count, (None, np.abs(wrench).max() + 1.0)],
     )
     return bool(program.status == 0 and program.x[-1] > 0.0)
@@ -43,7 +43,7 @@ def by_squares(
     low: Float[np.ndarray, "n_cables"] | None,
     high: Float[np.ndarray, "n_cables"] | None,
 ) -> bool:
-    """Tell whether tensions supply a wrench, by least squares with none negative (NNLS)."""
+    """Tell whether tensions can supply a wrench, by non-negative least squares (NNLS)."""
     from scipy.optimize import nnls
 
     dof, count = matrix.shape

@@ -1,9 +1,9 @@
-"""Rules that choose among the tensions of more cables than needed: a table, and the rules that are not exact.
+"""Rules that choose the tensions of redundant cables: a table of all, and the functions of those that are not exact.
 
-`tension_distribution` has the exact rules. The closed forms are what controllers compute; they are no tests of a
-workspace, since they can miss feasible tensions. Among 100,000 random poses of a suspended robot on eight cables the
-closed form found tensions for 12 % of the feasible poses (35 % with wider limits), the improved one for 98.8 % (99.6
-%), and neither found false ones.
+`tension_distribution` has the exact rules. Controllers use the closed forms; these cannot test a workspace, since they
+may miss feasible tensions. Among 100,000 random poses of a suspended robot on eight cables the closed form found
+tensions for 12 % of the feasible poses (35 % with wider limits) and the improved one for 98.8 % (99.6 %); neither found
+infeasible ones.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from cspr_jax.robots.tensions.tension_distribution import (
 from cspr_jax.robots.tensions.tension_distribution_lanes import FREE, least_norms
 
 BATCH = 4096
-# Steps of Newton's method for the p-norm: the weight of the limits decreases from the first value to the last one, with
-# which the last steps are made.
+# Newton's method for the p-norm: over STEPS steps the weight of the barriers at limits decreases from FIRST_WEIGHT to
+# LAST_WEIGHT, which the last LAST_STEPS steps keep.
 STEPS = 60
 LAST_STEPS = 12
 FIRST_WEIGHT = 1e-1
 LAST_WEIGHT = 1e-14
-LENGTHS = 24  # of each step, which are compared
-LONGEST_STEP = 0.99  # over the distance to the nearest limit
+LENGTHS = 24  # number of lengths that are tried for each step
+LONGEST_STEP = 0.99  # length of the longest step over the distance to the nearest limit
 # Distances of tensions from the reference below this fraction of the largest one are raised to it: at a distance of 0 a
 # second derivative would be infinite.
 NEAR = 1e-9
-# For cables without a largest tension the search may begin at this multiple of the largest tension of the least norm.
+# For cables without a largest tension the search begins below this multiple of the largest tension of least norm.
 FAR = 10.0
 EXPONENT = 4.0
 MIN_EXPONENT = 1.01
@@ -61,9 +61,9 @@ def closed_form(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Distribution:
-    """The tensions that are the nearest to the middles of their ranges: mid + W^+ (w - W mid).
+    """The tensions nearest to the middles of their ranges: mid + W^+ (w - W mid), Pott, Bruckmann and Mikelsons (2009).
 
-    Pott, Bruckmann and Mikelsons (2009). They need not keep the limits where other tensions do.
+    They may exceed limits even where other tensions keep them.
     """
     middle = 0.5 * (tension_min + tension_max)
     rest = all_tensions(matrix, wrench - matrix @ middle)
@@ -80,9 +80,9 @@ def improved_closed_form(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Distribution:
-    """The closed form, in which the cable farthest beyond a limit is held at the limit, again and again.
+    """The closed form, repeated with the cable that exceeds its limit most held at the limit, Pott (2013).
 
-    Pott (2013). A held cable is never let go, so that feasible tensions can be missed, though rarely.
+    A cable that is held is never released, so that feasible tensions are missed in rare cases.
     """
     solutions = all_tensions(matrix, wrench)
     middle = 0.5 * (tension_min + tension_max)
@@ -108,7 +108,7 @@ def improved_closed_form(
 
 
 def _as_found(answer: Distribution, tensions: Array, low: Array, high: Array) -> Distribution:
-    # Tensions of least norm replace those that break limits; even if they keep the limits, the rule has missed them.
+    # Tensions of least norm replace tensions that exceed limits; if they keep the limits, the rule has missed them.
     return answer._replace(is_within=answer.is_within & keeps(tensions, low, high))
 
 
@@ -121,16 +121,16 @@ def p_norm(
     reference: Float[Array, "n_cables"],
     exponent: Float[Array, ""],
 ) -> Distribution:
-    """The tensions within limits whose p-norm about reference tensions is the least; exact to 1e-6 of their range.
+    """The tensions within limits whose p-norm about reference tensions is smallest; exact to 1e-6 of their range.
 
-    By Newton's method along the path of logarithmic barriers, which ends at a weight of 1e-14 of the largest value:
-    active limits are then reached to 1e-10, weakly active ones to the root of the weight.
+    By Newton's method with logarithmic barriers, whose weight decreases to 1e-14 of the largest value: active limits
+    are then reached to 1e-10, weakly active ones to the square root of the weight.
     """
     solutions = all_tensions(matrix, wrench)
     magnitude = jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
     largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * magnitude)
     start, slack = centred(matrix, wrench, tension_min, largest)
-    # If the limits leave only one point, that point is the answer.
+    # If only one point is feasible, that point is the result.
     is_open = slack > TENSION_ERROR * magnitude
     tensions = jnp.where(
         is_open,
@@ -174,7 +174,7 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
         hessian = (solutions.kernel * diagonal[None]) @ solutions.kernel.T
         hessian = hessian + jnp.eye(freedom) * (1e-15 * jnp.trace(hessian) + 1e-300)
         direction = -solved(hessian, (solutions.kernel @ gradient)[:, None])[0][:, 0] @ solutions.kernel
-        # Go no farther than to a limit.
+        # Bound the step by the distance to the nearest limit.
         up, down = (
             jnp.where(has_largest, below / jnp.where(direction > 0.0, direction, 1.0), jnp.inf),
             above / jnp.where(direction < 0.0, -direction, 1.0),
@@ -193,7 +193,7 @@ class Rule(NamedTuple):
     """A rule that chooses tensions.
 
     Fields:
-        function: takes matrix, wrench, smallest and largest tensions; the p-norm also reference and exponent.
+        function: function of matrix, wrench, smallest and largest tensions; for the p-norm also reference and exponent.
         is_bounded: whether every cable needs a largest tension.
     """
 
@@ -222,7 +222,7 @@ def by_rule(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Distribution:
-    """Tensions in one state by a rule, the p-norm with the exponent 4 about `middles`."""
+    """Tensions in one state by a rule; the p-norm has the exponent 4 and `middles` as reference."""
     more = (middles(tension_min, tension_max), jnp.asarray(EXPONENT)) if rule == "p-norm" else ()
     return RULES[rule].function(matrix, wrench, tension_min, tension_max, *more)
 
@@ -280,7 +280,7 @@ _COMPILED = {name: jax.jit(jax.vmap(rule.function)) for name, rule in RULES.item
 
 
 def _least_norms(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray) -> Distribution:
-    # Compute in lanes, then the poses that these cannot decide by the slow form.
+    # Compute in lanes, and by the slow form for the poses that lanes cannot decide.
     answer, is_open = least_norms(matrix, wrench, low, high)
     again = np.flatnonzero(is_open)
     if len(again):
