@@ -1,4 +1,4 @@
-"""Binding criteria along a motion: at each time the one that is nearest to being broken, or broken by most."""
+"""Binding criteria along a motion: at each time the criterion with the smallest slack, negative where it fails."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def binding(
     times: Float[np.ndarray, "n"],
     details: Mapping[str, Any],
 ) -> dict[str, np.ndarray]:
-    """Flags of what binds, and its cables."""
+    """Flags of the binding criteria, and their cables."""
     slacks, names = [], []
     for flag, slack in _slacks(problem, state, of_cables):
         slacks.append(slack)
@@ -32,7 +32,7 @@ def binding(
     table, numbers = np.concatenate(slacks, axis=1)[: len(times)], np.array(names)
     nearest = np.where(np.isnan(table), np.inf, table).argmin(1)
     flags, cables = numbers[nearest].T
-    # Rows at which none of these criteria fails lie in the intervals of failure of others.
+    # Where none of these criteria fails, another criterion may, within its intervals of failure.
     is_broken = (np.take_along_axis(table, nearest[:, None], 1) < 0.0).any(1)
     for name, intervals in (details.get("failing_by_criterion") or {}).items():
         ends = np.reshape(intervals, (-1, 2))
@@ -42,7 +42,7 @@ def binding(
 
 
 def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
-    # Slacks (m, 1), or (m, n_cables), of each criterion, as `verification.proved_answers` compares them.
+    # Slacks (m, 1), or (m, n_cables), of each criterion, scaled as in `verification.proved_answers`.
     robot, limits = problem.robot, problem.limits
     weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
     low, high = (np.asarray(side, float) for side in tension_range(robot, limits))

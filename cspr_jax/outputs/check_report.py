@@ -17,10 +17,10 @@ from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.proved_answers import MotionProof
 
 SCHEMA = 1
-# Intervals of failure that the text names; the JSON has all of them.
+# Largest number of intervals of failure in the text; the JSON has all of them.
 MAX_INTERVALS = 12
 
-# Details of a motion that was retimed.
+# Details that only retimed motions have.
 RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_deviation")
 
 
@@ -63,7 +63,7 @@ def shown_proof(plan: PlannedMotions) -> MotionProof:
 
 
 def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:
-    # The worst cable of each limit, with a bound that no time exceeds.
+    # The worst cable of each limit, with a bound that holds at all times.
     rows, worst = case.criteria, dict[Verdict, int]()
     for k in np.argsort(case.proof.high / case.scales).tolist():
         worst.setdefault(rows[k].flag, k)
@@ -71,7 +71,7 @@ def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, A
     for flag in (flag for flag in CRITERIA if flag in worst):
         k = worst[flag]
         allowed, value = rows[k].allowed, rows[k].value(float(case.proof.high[k]))
-        # The bound is that of all cables.
+        # The bound holds for all cables.
         bound = min((_bound(case, j) for j in range(len(rows)) if rows[j].flag == flag), key=lambda pair: pair[0])[1]
         if flag == Verdict.BELOW_FLOOR:
             value, bound, allowed = (float(plan.frame.height(depth)) for depth in (value, bound, allowed))
@@ -90,7 +90,7 @@ def _peaks(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, A
 
 
 def _sampled_peaks(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
-    # Extremes that no criterion of the proof has: found along the motion, without a bound.
+    # Extremes of quantities that the proof does not bound, from samples of the motion.
     peaks, rows = plan.demands, dict[Verdict, tuple[str, str, Any]]()
     if plan.is_redundant:
         low, high = tension_range(plan.problem.robot, plan.problem.limits)
@@ -152,7 +152,7 @@ def _retimed(plan: PlannedMotions) -> list[str]:
 
 
 def _motion(plan: PlannedMotions) -> Any:
-    # The motion, if it is short enough to be held.
+    # The motion, if it is short enough to be held in memory.
     return plan.legs[0].motions[0] if plan.legs[0].motions else None
 
 

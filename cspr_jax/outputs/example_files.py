@@ -28,14 +28,14 @@ def examples() -> dict[str, str]:
 
 
 def copy(names: list[str], target: Path) -> list[Path]:
-    """Copy some of them; nothing is overwritten."""
+    """Copy some of the examples into a folder; existing files are not overwritten."""
     purposes, source = examples(), folder()
     for name in names:
         if name not in purposes:
             near = difflib.get_close_matches(name, purposes, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
             raise ConfigError("examples", f"{shown(name)}: {hint}must be one of those that `cspr examples` lists")
-    # A plan of a path may come with a file of the path, of the same name.
+    # The plan of a path may come with a file of the path's points, which has the same name.
     originals = [
         path for name in names for path in sorted(source.glob(f"{name}.*"), key=lambda path: path.suffix != ".toml")
     ]

@@ -1,7 +1,7 @@
-"""Criteria of a checked motion that lie on their limits, as far as its samples tell.
+"""Criteria of a checked motion that are on their limits, as far as its samples show.
 
-A motion that touches a limit, such as the fastest one, meets or misses it between samples by less than the error of the
-interpolation through these. That error is estimated by interpolation through every second sample.
+A motion that touches a limit, such as the fastest one, is above or below it between samples by less than the error of
+interpolation. That error is estimated by interpolation through every second sample.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
 # Criteria are compared with the error of interpolation if their smallest slack, over its scale, is below this.
 NEAR = 1e-3
-# Samples per piece, and largest number of pieces, at which motions are compared.
+# Number of samples per piece, and largest number of pieces, for comparing motions.
 SAMPLES, MAX_PIECES = 8, 256
 
 
@@ -28,7 +28,7 @@ class TouchedLimit(NamedTuple):
     """A criterion that a motion meets or misses by less than the error of its interpolation.
 
     Fields:
-        cause: by how much, where and when, in words too.
+        cause: the criterion with its numbers, time and words.
         tolerance: error of the interpolation, in the unit of the cause.
     """
 
@@ -49,7 +49,7 @@ class TouchedLimit(NamedTuple):
 
 
 def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit]:
-    """Criteria that lie on their limits, as far as samples of positions and their rates tell."""
+    """Criteria that are on their limits, as far as samples of positions and their rates show."""
     motion = plan.legs[0].motions[0] if plan.legs[0].motions else None
     if not isinstance(motion, Spline) or motion.interpolation != "hermite" or len(motion.knots) < 4:
         return []
@@ -66,8 +66,8 @@ def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit
 
 
 def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -> tuple[float, float]:
-    # The smallest slack of a criterion, and its largest change if every second sample is left out, near the times at
-    # which the criterion fails or its slack is smallest.
+    # Smallest slack of a criterion, and the largest change of its slack if every second sample is left out, near the
+    # times at which the criterion fails or its slack is smallest.
     taus = _sample_times(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
     scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"), trajectory=plan.keys)
 
@@ -81,7 +81,7 @@ def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -
 
 
 def _sample_times(knots: np.ndarray, failing: np.ndarray, when: float) -> np.ndarray:
-    # Normalised times within the pieces in which a criterion fails, or is smallest, and within their neighbours.
+    # Normalised times in the pieces in which a criterion fails, or its slack is smallest, and in their neighbours.
     spans = np.concatenate([failing, [[when, when]]])
     first, last = (np.searchsorted(knots, side) for side in spans.T)
     pieces = np.unique(np.concatenate([np.arange(i - 2, j + 2) for i, j in zip(first, last, strict=True)]))

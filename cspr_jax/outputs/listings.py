@@ -1,4 +1,4 @@
-"""Lists of what there is: the catalogue of robots, the quantities of results. Plain values, and tables for people."""
+"""Lists of the catalogue's robots and of the quantities of results, as plain values and as tables for people."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -63,7 +63,7 @@ def _remarks(spec: dict[str, Any]) -> list[str]:
 
 
 def robot_details(robot: dict[str, Any]):
-    """All about a robot for a terminal."""
+    """Details of a robot for a terminal."""
     pattern = _pattern(robot)
     shown = {"source": robot["source"], "moves": f"{pattern}, {_motion(pattern)}"}
     shown |= {"cables": str(len(robot["base_points"])), "mass (kg)": f"{robot['mass']:g}"}

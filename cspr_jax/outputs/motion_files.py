@@ -55,7 +55,7 @@ _FIELDS = {
 LARGEST_ROWS = 20_000_000
 # Quantities that may be infinite at some times although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
-# A tick nearer to the end of a segment than this, over the time between ticks, is that end.
+# A tick closer to the end of a segment than this fraction of the time between ticks is that end.
 SAME_TICK = 1e-6
 
 
@@ -116,14 +116,14 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     robot = plan.problem.robot
     is_redundant = robot.n_cables > robot.dof
-    # Other motions do not depend on limits: without any, plans with different limits run the same compiled code.
+    # Other motions do not depend on limits: leave these out, so that plans with different limits share compiled code.
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and robot.pulleys is None and is_rectangle(robot.base_points)
     pairs, parts = plan.robot_file.pairs, []
     longest = max(len(tau) for tau in taus)
     for i, tau in enumerate(taus):
-        # Segments of one length are compiled once.
+        # Pad all segments to one length, so that code is compiled once.
         padded, motion = np.concatenate([tau, np.ones(longest - len(tau))]), common_shape(motions[i])
         states_of_segment = _states(
             robot, limits, motion, padded, rule=plan.keys.tension_rule, with_couples=with_couples
@@ -141,7 +141,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
 
 
 def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
-    """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so."""
+    """Write the motion of a plan to a .csv or .h5 file, which says whether the plan is feasible."""
     is_motion = np.isfinite(plan.answers.duration).all()
     columns = rows(plan, rate=rate) if is_motion else {"t": plan.answers.duration}
     if not all(np.isfinite(values).all() for name, values in columns.items() if name not in OPEN):
@@ -154,7 +154,7 @@ def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
 
 
 def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
-    # Tell for each row whether its segment is feasible; a row at a boundary belongs to both segments.
+    # Whether the segment of each row is feasible; rows where two segments meet belong to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
     good = plan.is_feasible
@@ -162,7 +162,7 @@ def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
 
 
 def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
-    # One line of names and numbers, which every program reads; axes and units are those of the robot file.
+    # A line of names, then only numbers, which every program can read; axes and units are those of the robot file.
     heads = [head for name, values in columns.items() for head in columns_of(name, values[0].size)]
     table = np.column_stack(list(columns.values()))
     last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]

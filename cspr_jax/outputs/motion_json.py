@@ -14,7 +14,7 @@ from cspr_jax.schema.quantities import TRAJECTORY
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
 
-# Attributes of motion files that stand beside the rows.
+# Attributes of motion files that JSON has in addition to the rows.
 BESIDE = ("title", "software", "feasible", "family", "robot", "mass", "z_axis", "point", "z0")
 
 
@@ -26,7 +26,7 @@ def rows_object(plan: PlannedMotions, rate: float | None) -> dict[str, Any]:
 
 
 def write_json(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
-    """Write the rows of a plan to a .json file, with their units and what is known of the robot."""
+    """Write the rows of a plan to a .json file, with their units and attributes of the robot."""
     is_motion = np.isfinite(plan.answers.duration).all()
     fields: dict[str, Any] = rows_object(plan, rate) if is_motion else {"rows": {"t": [None]}}
     if any(None in np.ravel(values) for name, values in fields["rows"].items() if name not in OPEN):

@@ -1,4 +1,4 @@
-"""Paths of a plan: their speeds as its motion file has them, and lines below its table about them."""
+"""Paths of a plan: columns of path speeds for its motion file, and lines about paths below its table."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-MAX_NAMED = 4  # limits in a line
+MAX_NAMED = 4  # largest number of limits that a line names
 MIN_NAMED = 0.005  # fraction of the time during which a limit must bind to be named
 
 
@@ -75,7 +75,7 @@ def _of_section(section: Any, number: int, start: float) -> dict[str, np.ndarray
     minimum, plane = section.least, section.least.plane
     flags = np.array([0, *(Verdict[name.criterion.upper()].value for name in minimum.names)], FLAGS)
     cables = np.array([0, *(0 if name.cable is None else name.cable + 1 for name in minimum.names)], np.int16)
-    # Behind the last node there is no cell.
+    # There is no cell after the last node: repeat the last one.
     binds = np.append(minimum.binds, minimum.binds[-1:]) + 1
     segments = section.before + np.append(section.segments, section.segments[-1:]) + 1
     return {

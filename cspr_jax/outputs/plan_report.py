@@ -14,7 +14,7 @@ from cspr_jax.schema.plan_fields import SEGMENT
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
-# Positions can be copied into a plan: P0 is at rest to 1e-9 of the robot's size.
+# Digits of positions, so that they can be copied into a plan: a position counts as P0 to 1e-9 of the robot's size.
 DIGITS = 12
 
 
@@ -38,7 +38,7 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
 
 
 def axes_text(plan: PlannedMotions) -> str:
-    """Axes and point of the positions that files of a plan hold."""
+    """Axes of the positions in files of a plan, and the point that they describe."""
     point = "; files hold the positions of the origin of the platform's axes" if plan.is_at_origin else ""
     return f"z {plan.robot_file.z_axis}{point}"
 
@@ -48,7 +48,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
     return "feasible" if feasible else Verdict(int(verdict)).text
 
 
-# Fields of segments that are never null: every family has the first, and the second is absent where a family has none.
+# Fields of segments that are never null: every family has the first; the second is left out where a family has none.
 _OF_DETAILS = ("margin_unit", "tried_oscillations")
 
 
@@ -85,7 +85,7 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """Plain values for JSON."""
+    """Plain values for JSON, in which None replaces numbers that are not finite."""
     if isinstance(value, dict):
         return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):
@@ -119,7 +119,7 @@ Column = Callable[[dict[str, Any]], str]
 def _positions(plan: PlannedMotions) -> dict[str, Column]:
     def position(segment: dict[str, Any]) -> str:
         pose = plan.keys.pose[segment["to"]]
-        # The end of a launch follows from the launch: nobody gives that position.
+        # The pose at the end of a launch follows from the launch: nobody gave its digits.
         digits = DIGITS if pose.rest or pose.position is not None else 4
         return f"({', '.join(f'{round(value, DIGITS) + 0.0:.{digits}g}' for value in plan.points[segment['to']])})"
 
@@ -127,7 +127,7 @@ def _positions(plan: PlannedMotions) -> dict[str, Column]:
 
 
 def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
-    # Lines show their times. Oscillations are counted where every segment has them.
+    # Plans of lines get a column of times; oscillations are shown if every segment has them.
     lines = all(segment["active"] is not None for segment in segments)
     beziers = all(segment["control_points"] is not None for segment in segments)
     swings = all(segment["inclination"] is not None for segment in segments)
@@ -177,7 +177,7 @@ def _durations() -> dict[str, Column]:
 
 
 def _proved(counts: dict[str, Column]) -> dict[str, Column]:
-    # Motions over pulleys have numbers of arcs, too.
+    # Swings over pulleys have numbers of arcs, too.
     return dict(itertools.islice(counts.items(), 1)) | {
         "T (s)": _of("duration", ".4f"),
         "margin (N)": _two_digits("tension_margin"),
@@ -186,7 +186,7 @@ def _proved(counts: dict[str, Column]) -> dict[str, Column]:
 
 
 def _bounded(columns: dict[str, Column]) -> dict[str, Column]:
-    # Lower bounds of the least time stand behind the time.
+    # Lower bounds of the least time follow the time.
     def gap(segment: dict[str, Any]) -> str:
         return "-" if segment["gap"] is None else two_digits(100.0 * segment["gap"])
 
@@ -236,7 +236,7 @@ def _caption(plan: PlannedMotions) -> str:
 
 
 def retimed_words(before: float, after: float) -> str:
-    """Durations before and after running along a path again."""
+    """Durations before and after retiming, in words."""
     change = after / before - 1.0
     digits = 0 if abs(change) >= 0.1 else 1
     words = f"{100.0 * abs(change):.{digits}f} % {'longer' if change > 0.0 else 'shorter'}"
@@ -244,7 +244,7 @@ def retimed_words(before: float, after: float) -> str:
 
 
 def _causes(plan: PlannedMotions) -> str:
-    # A line for each segment that is not feasible, after its number in the table.
+    # Lines for each segment that is not feasible, with its number in the table.
     lines = [(i + 1, [cause.text for cause in causes]) for i, causes in enumerate(plan.causes) if causes]
     return "".join(f"\nto {to}: {'; '.join(words)}" for to, words in lines)
 

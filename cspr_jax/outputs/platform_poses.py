@@ -1,4 +1,4 @@
-"""Poses of a platform's own axes, of their origin and of how they turn, in place of those of its mass centre."""
+"""Poses of a platform's own axes, at their origin, in place of poses of its mass centre."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # pictures need no plans
 
 
 def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Rows of a plan whose point is the origin of a platform's axes, of that point and of these axes."""
+    """Rows of a plan with position and orientation of a platform's own axes, where the plan asks for their origin."""
     quaternion = of_own_axes(plan.robot_file, columns["quaternion"])
     centre = np.asarray(plan.robot_file.centre_of_mass or [0.0] * 3)
     arm = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).apply(centre)
@@ -38,7 +38,7 @@ def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[st
 
 
 def of_own_axes(robot_file: RobotFile, quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
-    """Orientations of a platform's axes in its file, of those from its reference orientation."""
+    """Orientations of a platform's axes as in its file, from orientations relative to its reference orientation."""
     reference = reference_of(build_robot(robot_file, TrajectoryKeys(), robot_file.name))
     rotated = frame_of(robot_file.base_points, robot_file.z_axis).rotated_quaternions(reference)
     return products(quaternions, rotated[None])

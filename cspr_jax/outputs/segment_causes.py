@@ -1,4 +1,4 @@
-"""The worst cause of each segment in motion files, and in words from there."""
+"""The worst cause of each segment: as columns of motion files, and as words from these columns."""
 
 from collections.abc import Mapping, Sequence
 
@@ -19,7 +19,7 @@ def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
         "segment_cause": np.array([Verdict[cause.criterion.upper()].value for cause in worst]),
         "segment_cause_cable": np.array([cause.cables[0] + 1 if len(cause.cables) == 1 else 0 for cause in worst]),
         "segment_cause_time": np.array([cause.t for cause in worst]),
-        # The flag alone says what the unit is: numbers in another one stay out.
+        # Files have no unit of causes: leave out numbers whose unit is not the usual one of their flag.
         "segment_needed": np.array([cause.needed if is_usual(cause) else np.nan for cause in worst]),
         "segment_allowed": np.array([cause.allowed if is_usual(cause) else np.nan for cause in worst]),
     }

@@ -1,4 +1,4 @@
-"""A published table as printed: its rows and columns, published and computed numbers in one cell."""
+"""A published table in its printed layout, with published and computed numbers in each cell."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -12,11 +12,11 @@ LEGEND = (
     f"Each cell: published / computed, with as many digits as printed. {MISMATCH}: they differ by more than the "
     f"rounding of these digits. {UNKNOWN}: not printed, or not known. {NOTHING}: no feasible number was found."
 )
-# Names of JSON cells, as people read them.
+# Heads of columns in place of their names in JSON.
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
-WIDEST = 10  # columns of a table that are shown in one block
-SIDE_BY_SIDE = 6  # columns of each block of a table with more
-DIGIT_ERROR = 1e-9  # rounding error of a number, and of half a unit of its last digit, over these
+WIDEST = 10  # largest number of columns of a table that is shown in one block
+SIDE_BY_SIDE = 6  # number of columns of each block of a wider table
+DIGIT_ERROR = 1e-9  # relative rounding error of a number, and of half a unit of its last digit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Cell:
     """One cell of a table.
 
     Fields:
-        row: as printed.
-        column: as printed, or its name.
-        computed: by this program; None where nothing was found.
-        printed: in the source, digit by digit; "" where it is not printed, or not known.
-        variant: the reading of the source, where there are several.
+        row: head of the row, as printed.
+        column: head of the column as printed, or its name.
+        computed: number that this program computed; None where there is none.
+        printed: number as printed in the source; "" where it is not printed, or not known.
+        variant: interpretation of the source, where there are several.
     """
 
     row: str
@@ -63,14 +63,14 @@ def grid(
     is_full: bool = False,
     reason: Callable[[Cell], str] = lambda _: "",
 ) -> Any:
-    """A table for a terminal: one block for each reading of the source, or for the one that its numbers fit."""
+    """A table for a terminal: a block for each interpretation of the source, or only for the one that fits."""
     from rich.console import Group  # only a terminal needs it
 
     variants = list(dict.fromkeys(cell.variant for cell in cells))
     reading = reading if reading in variants else ""
     variants.sort(key=lambda name: name != reading)
     blocks: list[Any] = []
-    reasons: dict[str, str] = {}  # letter of each
+    reasons: dict[str, str] = {}  # reasons with their letters
     for name in variants:
         cells_of_variant = [cell for cell in cells if cell.variant == name]
         letters = {cell: _letter(reason(cell), reasons) for cell in cells_of_variant if cell.differs}
@@ -136,7 +136,7 @@ def computed_text(cell: Cell, cells: list[Cell]) -> str:
 
 
 def two_digits(value: float) -> str:
-    """A number with two digits that count."""
+    """A number with two significant digits."""
     text = f"{value:.2g}"
     return f"{value:.0f}" if "e+" in text else text
 

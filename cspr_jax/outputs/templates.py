@@ -1,6 +1,6 @@
-"""Templates of robot, sweep and plan files: an example's values, and every other key as a comment.
+"""Templates of robot, sweep and plan files: values of an example, and all other keys as comments.
 
-Keys, their order, defaults and meanings are the schema's own, so that no template is out of date.
+Keys, their order, defaults and meanings come from the schema, so that no template is out of date.
 """
 
 import textwrap
@@ -32,12 +32,12 @@ MANY = "pose"
 WIDTH = 100
 # Every robot has these, whatever else its file holds.
 FIRST = ("name", "base_points", "mass", "z_axis")
-# Keys of families that others of the same kind refuse.
+# Keys that only some families of a template take.
 OWN = {"rule": ("s-curve",)}
 
 
 def robot_template(like: str) -> str:
-    """A robot file with the values of one of the catalogue."""
+    """A robot file with the values of a robot of the catalogue."""
     if like not in catalogue.catalogue_names():
         raise InputError("--like", like, one_of(like, catalogue.catalogue_names()))
     values = tomllib.loads((catalogue.CATALOGUE / f"{like}.toml").read_text("utf-8"))
@@ -54,7 +54,7 @@ def sweep_template(kind: str) -> str:
     examples = _examples("map")
     alike = (name for name, other in MAP_KINDS.items() if name in examples and other.families == row.families)
     values = dict(examples[kind if kind in examples else next(alike)], map=kind)
-    # Keys that only other kinds have are refused.
+    # Keys that only other kinds of maps have, which this kind refuses.
     special = (*ObstacleKeys.model_fields, *(key for other in MAP_KINDS.values() for key in other.keys))
     refused = frozenset(special) - frozenset(row.keys)
     for key in refused:
@@ -81,7 +81,7 @@ def plan_template(family: str) -> str:
 
 
 def write_new(path: Path, text: str) -> Path:
-    """Write a template; nothing is overwritten."""
+    """Write a template to a new file."""
     if path.suffix != ".toml":
         raise InputError("file", str(path), "a name that ends in .toml")
     make_folders(Disk(), path.parent)
@@ -96,7 +96,7 @@ def write_new(path: Path, text: str) -> Path:
 
 
 def _examples(key: str) -> dict[str, dict[str, Any]]:
-    # Return by map or family the first example of each; those of one family and a few keys come first.
+    # Example of each map or family: the shortest one.
     files = [tomllib.loads(path.read_text("utf-8")) for path in sorted(folder().glob("*.toml"))]
     kind = [values for values in files if key in values and ("pose" in values) == (key == "family")]
     examples: dict[str, dict[str, Any]] = {}
@@ -106,7 +106,7 @@ def _examples(key: str) -> dict[str, dict[str, Any]]:
 
 
 def _section(at: str, model: type[Table], values: Mapping[str, Any], refused: frozenset[str]) -> str:
-    # Plain keys come first: behind the head of a table they would be keys of the table.
+    # Plain keys come first: after the head of a table they would belong to the table.
     plain, tables = [], []
     for name in _ordered(model):
         field = model.model_fields[name]
@@ -154,7 +154,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _model(annotation: Any) -> type[Table] | None:
-    # Return the table that a key holds, itself or among its choices.
+    # Table that a key holds, as its type or among the types of a union.
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
     return next((table for choice in get_args(annotation) if (table := _model(choice)) is not None), None)

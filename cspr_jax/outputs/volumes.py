@@ -1,4 +1,4 @@
-"""Volumes of workspaces: of a map, with the error that its grid leaves."""
+"""Volumes of workspaces from maps, with the error due to the grid."""
 
 import dataclasses
 from typing import Any
@@ -12,7 +12,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
 _, INSIDE, OUTSIDE = range(len(CELL_SIDES))
-# Reasons why cells are open, in lines of text.
+# Words for the reasons why cells are not proved.
 OPEN_WORDS = {name: f"inside at the centre, {name} not proved" for name in OPEN_CONDITIONS} | {
     "boundary": "cut by the boundary",
     "outside": "outside at the centre, not proved",
@@ -28,7 +28,7 @@ class WorkspaceVolume:
     Fields:
         axes: the other axes, in the order of the dimensions (...) below.
         units: units of volumes, "m3", "m2" or "m".
-        volume: (...) volume of the cells that are inside, between the first and the last points, m^3, m^2 or m.
+        volume: (...) volume of the cells inside, between the first and the last points, m^3, m^2 or m.
         error: (...) error due to the grid if the boundary passes at most once between two points, m^3, m^2 or m: half
             of the way between each two points on different sides, a quarter of their cells.
         least: (...) volume of the cells that are proved inside as a whole; 0 where nothing was proved.
@@ -112,7 +112,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
     def placed(name: str) -> np.ndarray:
         values = result.data[name].transpose(*others, *order)
-        # A coordinate that has only one value has one cell along its axis.
+        # An axis with only one point has one cell.
         singles = tuple(i for i, k in enumerate(others) if names[k] in axes)
         return values.squeeze(axis=singles)
 
@@ -143,7 +143,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
 
 def _widths(points: np.ndarray, name: str) -> np.ndarray:
-    # Return the widths of the parts of an axis that its points stand for.
+    # Widths of the parts of an axis that its points represent.
     order = np.argsort(points)
     gaps = np.diff(points[order])
     widths = np.empty(len(points))

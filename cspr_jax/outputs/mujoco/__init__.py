@@ -1,1 +1,1 @@
-"""MuJoCo: a plan as a model with tensions, and played."""
+"""MuJoCo: plans written as models with tensions, and plans played in its simulation."""

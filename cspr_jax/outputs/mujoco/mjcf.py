@@ -1,7 +1,7 @@
 """A plan for MuJoCo as files: a model of its robot (MJCF), and the tensions that play the plan in it, open-loop.
 
-Written without MuJoCo. The control file has the rows of `mujoco_motion.Played`: two a step, and one that repeats the
-time of the row before where steps end at a jump of the acceleration.
+These files are written without MuJoCo. The control file has the rows of `outputs.mujoco.motion.Played`: two for each
+step, and one more with the time of the row before where the acceleration jumps.
 """
 
 import csv
@@ -30,13 +30,13 @@ KEYFRAME = "start"
 # Sizes of what is drawn, over the diagonal of the box around spools and path.
 MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
 THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
-# Of a pulley:
+# Numbers for pulleys:
 LEAD = 0.5  # length of cable below the entry point, over the radius
-WHEEL_WIDTH = 0.15  # half of its width, over the radius
+WHEEL_WIDTH = 0.15  # half width of the wheel, over the radius
 SWIVEL_INERTIA = 1e-9  # over mass and squared extent of the robot: the smallest with which MuJoCo works well
-FOLLOWING = 0.1  # distance of the points that keep it in the plane of its cable, over the extent of the robot
+FOLLOWING = 0.1  # distance of the points that keep a pulley in the plane of its cable, over the extent of the robot
 SMALLEST_GAP = 0.01  # rad, between start and end of a tendon around a pulley
-LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # from z to -y
+LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # quaternion of the rotation from z to -y
 CLEAR = (0.0, 0.0, 0.0, 0.0)
 DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
 BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform_hull"
@@ -49,7 +49,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     words = f"World axes are those of the robot file{rotated}; z is up. A control is the tension of a cable, N."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
-    # A dense Jacobian of the tendons has one row a cable. Pulleys follow their cables by constraints.
+    # Make the Jacobian of the tendons dense, with a row for each cable. Constraints make pulleys follow their cables.
     gravity = [0.0, 0.0, -body.gravity]
     solver = {"tolerance": 1e-14} if len(body.wheels) else {}
     _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense", **solver)
@@ -77,7 +77,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
 
 
 def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Element:
-    # Words are written as they are, numbers with all their digits; there is no -0.
+    # Words are written unchanged, numbers with all their digits but without -0.
     text = {
         name: value if isinstance(value, str) else " ".join(repr(float(x) + 0.0) for x in np.ravel(value))
         for name, value in attributes.items()
@@ -103,7 +103,7 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, extent: f
         effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:7])
         _add(effector, "freejoint", name="pose")
     radius = MASS_RADIUS * extent
-    # An end effector that does not turn may have any inertia, but it must have one.
+    # An effector that does not turn may have any inertia, but MuJoCo requires one.
     moments, axes = _principal(0.4 * body.mass * radius**2 * np.eye(3) if body.inertia is None else body.inertia)
     quaternion = np.roll(axes.as_quat(), 1)
     _add(effector, "inertial", pos=np.zeros(3), mass=body.mass, diaginertia=moments, quat=quaternion)
@@ -118,13 +118,13 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, extent: f
             _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * extent, **drawn)
     for k, point in enumerate(body.points, 1):
         _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * extent, rgba=ORANGE)
-    # Behind the effector, whose coordinates are the first ones.
+    # Pulleys come after the effector, so that the effector's coordinates are the first ones.
     if len(body.wheels):
         _pulleys(world, body, moved, extent)
 
 
 def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, extent: float) -> None:
-    # Each swivels about its axis at the entry point, the x axis of its body towards its centre.
+    # Each pulley swivels about its axis at the entry point; the x axis of its body points to its centre.
     axes, radii = np.asarray(body.pulleys.axes), np.asarray(body.pulleys.radius)  # type: ignore[union-attr]
     points, middles = attachments(body, moved)[0], _sides(body, moved)
     inertia = np.full(3, SWIVEL_INERTIA * body.mass * extent**2)
@@ -146,8 +146,8 @@ def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, extent:
 
 
 def _sides(body: Suspended, moved: Played) -> np.ndarray:
-    # Return directions from the centres of the pulleys, rad from the entry point on, by which MuJoCo wraps tendons the
-    # right way around: less than half a turn behind the start of the tendon, and before its end, in all rows.
+    # Angles from the entry points, in rad, of sites by which MuJoCo wraps tendons around the right side of pulleys:
+    # less than half a turn behind the start of the tendon, and before its end, in all rows.
     axes, radii = (np.asarray(x)[body.wheels] for x in (body.pulleys.axes, body.pulleys.radius))  # type: ignore[union-attr]
     with double_precision():
         exits_of_cables = _EXITS(body.spools[body.wheels], axes, radii, attachments(body, moved)[:, body.wheels])
@@ -176,8 +176,8 @@ def _geom(shape: Obstacle | Body) -> dict[str, Any]:
 
 
 def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:
-    # MuJoCo finds the axes of a full tensor to 6e-7 only, and refuses a body whose largest moment is above the sum of
-    # the others, be it by rounding.
+    # MuJoCo computes principal axes to 6e-7 only, and refuses a body whose largest moment exceeds the sum of the
+    # others, even by rounding.
     moments, axes = np.linalg.eigh(inertia)
     moments[2] = min(moments[2], moments[0] + moments[1])
     return moments, Rotation.from_matrix(axes * np.linalg.det(axes))
@@ -195,7 +195,7 @@ def _cables(tendons: ElementTree.Element, body: Suspended, extent: float) -> Non
 
 
 def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body: Suspended, step: float) -> None:
-    # A pulley is in one plane with its cable where two points on either side are equally far from the attachment point.
+    # A pulley is in the plane of its cable if two points on either side are equally far from the attachment point.
     for k in (body.wheels + 1).tolist():
         for name in ("left", "right"):
             tendon = _add(tendons, "spatial", name=f"{name}_{k}", width=THINNEST, rgba=CLEAR)
@@ -206,7 +206,7 @@ def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body
 
 
 def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
-    # A positive control shortens the cable; no cable pushes. Without a limit there is a reserve for a controller.
+    # A positive control shortens the cable; none can push. Where there is no limit, leave a reserve for a controller.
     maximum = np.maximum(moved.tension.max(0), 0.0)
     largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * maximum.max()), maximum)
     for k, tension in enumerate(largest.tolist(), 1):
@@ -227,6 +227,6 @@ def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
     writer.writerow(["t", *(f"tension_{k + 1}" for k in range(moved.tension.shape[1]))])
     writer.writerows([map(repr, row) for row in np.column_stack([moved.time, moved.tension]).tolist()])
     note = "" if plan.feasible else " The plan is NOT PROVED FEASIBLE; no cable of the model pushes."
-    # The model names the other one, which is there before it.
+    # Write the control file before the model that names it.
     publish(Disk(), beside, text.getvalue().encode())
     publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name, note).encode())

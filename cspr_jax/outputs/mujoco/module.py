@@ -1,4 +1,4 @@
-"""MuJoCo, which is optional; without jax, so that commands ask for it before they set jax up."""
+"""Import of MuJoCo, which is optional; without jax, so that commands can check for it before they set jax up."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from cspr_jax.errors import ConfigError
 
 
 def need_mujoco() -> Any:
-    """MuJoCo, an optional dependency."""
+    """Import MuJoCo, or say how to install it."""
     try:
         import mujoco
     except ImportError as error:

@@ -1,8 +1,8 @@
 """A plan in MuJoCo's coordinates: what hangs on the cables, its motion, and the tensions that play it.
 
-World axes have z up: those of the robot file, turned by half a turn about x where its z points down. Tensions are at
-both ends and in the middle of each step of the integrator, RK4, which asks for them there. No step runs across a
-time at which the acceleration, or its derivative, may jump.
+World axes have z up: they are the axes of the robot file, rotated by half a turn about x where its z points down.
+Tensions are given at both ends and in the middle of each step, where the integrator, RK4, needs them. No step extends
+across a time at which the acceleration, or its derivative, may jump.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from cspr_jax.robots.model.shapes import Body, Obstacle, inward, rotated
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
+STEP = 0.0005  # s, default of the longest step
 # In normalised time:
-BESIDE = 4e-15  # distance from a jump of the rows on both sides of it
-ONE_JUMP = 1e-9  # jumps that are nearer to each other are one
+BESIDE = 4e-15  # distance of the rows on both sides of a jump from the jump
+ONE_JUMP = 1e-9  # jumps closer together than this are one
 _SIGNS = {"up": (1.0, 1.0, 1.0), "down": (1.0, -1.0, -1.0)}
 
 
@@ -39,11 +39,11 @@ class Suspended(NamedTuple):
     """A robot in MuJoCo's axes.
 
     Fields:
-        name: for people.
-        z_axis: where z of its file points, "down" or "up".
-        axes: of the slide joints of what hangs on the cables, 0 to 2; none: a free joint.
+        name: name, for texts.
+        z_axis: direction of z in its file, "down" or "up".
+        axes: axes of the slide joints of the effector, 0 to 2; empty: it has a free joint.
         mass: kg.
-        inertia: (3, 3) about the mass centre, body axes, kg m^2; None: of a point.
+        inertia: (3, 3) about the mass centre, body axes, kg m^2; None: a point mass.
         gravity: m/s^2.
         spools: (n_cables, 3) m.
         points: (n_cables, 3) attachment points from the mass centre, body axes, m.
@@ -51,7 +51,7 @@ class Suspended(NamedTuple):
         cable_diameter: m; None: not known.
         obstacles: bodies fixed in space.
         body: shape of the platform in body axes, from the mass centre; None: not known.
-        pulleys: whose axes are MuJoCo's; None: cables leave from points.
+        pulleys: pulleys, with MuJoCo's axes; None: cables leave from points.
     """
 
     name: str
@@ -79,13 +79,13 @@ class Played:
     """Motion and tensions at every half of a step, in MuJoCo's axes.
 
     Fields:
-        time: (n,) since the start of the plan, s; one that stands twice ends a run of steps and starts another.
+        time: (n,) time from the start of the plan, s; a time that occurs twice ends a run of steps and starts another.
         segment: (n,) numbers of the segments, from 1 on.
         tension: (n, n_cables) N.
-        position: (n, 3) of the mass centre, m.
+        position: (n, 3) position of the mass centre, m.
         velocity: (n, 3) m/s.
         acceleration: (n, 3) m/s^2.
-        rotation: n rotations from body to world axes; None of what does not turn.
+        rotation: n rotations from body to world axes; None for an effector that does not turn.
         omega: (n, 3) angular velocity in body axes, rad/s; None likewise.
         omega_dot: (n, 3) its derivative, rad/s^2; None likewise.
     """
@@ -155,7 +155,7 @@ def suspended(plan: PlannedMotions) -> Suspended:
 
 
 def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
-    # The shape of the platform, which turns with its attachment points from the axes of the file.
+    # Shape of the platform, rotated from the axes of the file together with its attachment points.
     written = plan.robot_file.as_written
     centre = np.asarray(written.centre_of_mass or [0.0] * 3, float)
     shape = plan.keys.body(centre.tolist(), written.platform_points or ())
@@ -167,7 +167,7 @@ def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
 
 
 def attachments(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables 3"]:
-    """Points at which the cables are attached."""
+    """Points at which the cables are attached, at all rows."""
     arms = body.points[None]
     if moved.rotation is not None:
         arms = np.einsum("nij,kj->nki", moved.rotation.as_matrix(), body.points)
@@ -196,7 +196,7 @@ def coordinates(
 
 
 def played(plan: PlannedMotions, step: float = STEP) -> Played:
-    """Motion and tensions of a plan, as MuJoCo asks for them."""
+    """Motion and tensions of a plan at the times at which MuJoCo needs them."""
     if not 0.0 < step < math.inf:
         raise ConfigError("--step", f"{shown(step)}: must be a number > 0, in s")
     if not np.isfinite(plan.answers.duration).all():
@@ -221,14 +221,14 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
         # SciPy has the scalar last.
         rotation = Rotation.from_quat(np.roll(world.rotated_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()
-        # The derivative is the same in axes that turn: omega x omega is zero.
+        # The derivative of omega is the same in rotating axes, since omega x omega is zero.
         moved |= {name: back.apply(world.rotated(columns[name])) for name in ("omega", "omega_dot")}
         moved["rotation"] = rotation
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 
 
 def _step_times(plan: PlannedMotions, step: float) -> tuple[list[np.ndarray], np.ndarray]:
-    # Return the normalised times of each segment, and all times: rows on either side of a jump have the same time.
+    # Normalised times of each segment, and all times; the rows on both sides of a jump have the same time.
     taus, times, start = [], [], 0.0
     for motion, length in zip(plan.motions, plan.answers.duration.tolist(), strict=True):
         knots, taus_of_motion = [0.0], []

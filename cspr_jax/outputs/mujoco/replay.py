@@ -1,4 +1,4 @@
-"""A plan played in MuJoCo: where its tensions take the model, and which tensions MuJoCo asks for along its path."""
+"""A plan played in MuJoCo: the path on which its tensions take the model, and MuJoCo's tensions along the plan."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class PlayedPath(NamedTuple):
     """Path of MuJoCo's robot.
 
     Fields:
-        position: (n, 3) of the mass centre, m.
+        position: (n, 3) position of the mass centre, m.
         rotated: (n,) angle from the planned orientation, rad; 0 for a point mass.
     """
 
@@ -35,22 +35,22 @@ class PlayedPath(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class PlayedPlan:
-    """A plan beside what MuJoCo makes of it, at the ends of its steps; in the axes of the robot file.
+    """A plan and the motion that MuJoCo computes from it, at the ends of steps; in the axes of the robot file.
 
     Fields:
-        robot: its name.
-        z_axis: where its z points, "down" or "up".
+        robot: name of the robot.
+        z_axis: direction of its z axis, "down" or "up".
         mujoco: version of MuJoCo.
-        steps: their number.
-        time: (n,) since the start of the plan, s; twice where segments meet or the acceleration may jump.
+        steps: number of steps.
+        time: (n,) time from the start of the plan, s; twice where segments meet or the acceleration may jump.
         segment: (n,) number of the segment, from 1 on.
-        position: (n, 3) of the plan, m.
-        played: where the tensions take MuJoCo's robot, each segment from its start as planned.
-        through: the same for all segments in one go, from the start of the plan alone.
-        tension: (n, n_cables) of the plan, N; of parallel pairs those of all six cables.
-        tension_deviation: (n, n_cables) the least change, in the sum of squares, with which these tensions supply what
-            MuJoCo's inverse dynamics asks for along the plan's path, N; on as many cables as degrees of freedom that is
-            the difference of the two programs' tensions.
+        position: (n, 3) planned position, m.
+        played: path of MuJoCo's robot under the tensions, each segment from its planned start.
+        through: the same with all segments in succession, from the start of the plan.
+        tension: (n, n_cables) planned tensions, N; for parallel pairs, of all six cables.
+        tension_deviation: (n, n_cables) change of these tensions, with the least sum of squares, that makes them supply
+            the wrench of MuJoCo's inverse dynamics along the plan's path, N; on as many cables as degrees of freedom, the
+            difference of the two programs' tensions.
     """
 
     robot: str
@@ -67,16 +67,16 @@ class PlayedPlan:
 
     @property
     def path_deviation(self) -> np.ndarray:
-        """Distance from the plan where each segment is played from its start, (n,) m."""
+        """Distance from the plan if each segment is played from its planned start, (n,) m."""
         return np.linalg.norm(self.played.position - self.position, axis=1)
 
     @property
     def through_deviation(self) -> np.ndarray:
-        """Distance from the plan where all segments are played in one go, (n,) m."""
+        """Distance from the plan if all segments are played in succession, (n,) m."""
         return np.linalg.norm(self.through.position - self.position, axis=1)
 
     def to_dict(self) -> dict[str, Any]:
-        """The largest deviations, and where they are."""
+        """The largest deviations, and where they occur, as plain values."""
         cable = np.abs(self.tension_deviation).argmax(1)
         of_cables = np.abs(self.tension_deviation).max(1)
         deviations = {
@@ -141,13 +141,13 @@ def ends_of_steps(moved: Played) -> Int[np.ndarray, "n"]:
 
 
 def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
-    """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator."""
+    """Path of MuJoCo's robot under the tensions of a motion, by MuJoCo's own integrator."""
     mujoco = need_mujoco()
     qpos, rates, _ = coordinates(body, moved)
     reached, row = [], 0
 
     def control(model: Any, data: Any) -> None:
-        # RK4 asks at the start of a step, twice in its middle, and at its end.
+        # RK4 calls this at the start of a step, twice in its middle, and at its end.
         data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
 
     with _callback_lent(mujoco):
@@ -168,7 +168,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
 
 @contextlib.contextmanager
 def _callback_lent(mujoco: Any) -> Iterator[None]:
-    # A process has one control callback, which MuJoCo calls when it compiles a model, too.
+    # MuJoCo has one control callback for the process, and calls it even while it compiles a model.
     with _LENT:
         before = mujoco.get_mjcb_control()
         mujoco.set_mjcb_control(None)
@@ -190,11 +190,11 @@ def _played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> Pla
 
 
 def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:
-    """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path."""
+    """Difference between tensions of a motion and those that MuJoCo's inverse dynamics requires along its path."""
     mujoco = need_mujoco()
     with _callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
-    # The pulleys are put where the cables lead, so that the constraints that keep them there are not needed.
+    # The pulleys are placed in the planes of their cables, so that constraints for that are not needed.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
     rows, freedoms = ends_of_steps(moved), model.nv - len(body.wheels)
     data, (qpos, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)
@@ -202,7 +202,7 @@ def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_
     for i, row in enumerate(rows.tolist()):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[row], rates[row], accelerations[row]
         mujoco.mj_inverse(model, data)
-        # A cable that shortens pulls.
+        # A positive tension shortens its cable, hence the sign.
         jacobians[i], forces[i] = -_tendons(model, data)[: model.nu, :freedoms].T, data.qfrc_inverse[:freedoms]
     missing = forces - np.einsum("nij,nj->ni", jacobians, moved.tension[rows])
     return np.einsum("nji,ni->nj", np.linalg.pinv(jacobians), missing)

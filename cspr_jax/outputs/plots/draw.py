@@ -1,4 +1,4 @@
-"""Picture of results: its kind, and the part of the data that it shows."""
+"""Choice of the picture of results: its kind, and the part of the data that it shows."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -35,12 +35,12 @@ class MapView(NamedTuple):
     """A part of a map.
 
     Fields:
-        name: of the quantity.
-        data: its values, one dimension for each of `across`.
-        excluded: of data's shape, the cells that are excluded by other conditions than that of the quantity.
+        name: name of the quantity.
+        data: values of the quantity, one dimension for each of `across`.
+        excluded: cells, in the shape of data, that conditions other than that of the quantity exclude.
         across: axes that vary.
         fixed: words for the fixed axes.
-        coordinates: of the axes that were fixed.
+        coordinates: coordinates on the fixed axes.
     """
 
     name: str
@@ -132,7 +132,7 @@ def _varying(result: Result, at: dict[str, float]) -> list[str]:
 
 
 def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dict[str, int], list[str]]:
-    # Return the point of each other axis, by default the first, and the words of the picture for it.
+    # Point of each axis that is not shown, by default the first, and words about it for the picture.
     chosen_points = {axis: nearest(result, axis, coordinate) for axis, coordinate in at.items()}
     others = {axis: (0, first_of(result, axis)) for axis in result.axes if axis not in across}
     point_of_axis = others | chosen_points
@@ -205,7 +205,7 @@ def _constant(result: Result, view: MapView, name: str | None = None) -> list[st
 
 
 def _informative_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
-    # The answer is the same for every quantity of a file, so that their pictures show the same sections.
+    # The result is the same for every quantity of a file, so that all its pictures show the same sections.
     names = ["verdict"] if "verdict" in result.data else list(result.data)
     informative = [is_informative(name, _panelled(result, _view(result, name, at), order).data) for name in names]
     return np.any(informative, axis=0)
@@ -231,7 +231,7 @@ def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
 
 
 def _panelled(result: Result, view: MapView, order: list[str]) -> MapView:
-    # Keep at most three axes, in this order; the others are at their first point.
+    # Keep at most three axes, in this order; fix the others at their first points.
     data, hatched = (x.transpose([view.across.index(axis) for axis in order]) for x in (view.data, view.excluded))
     fixed, coordinates = list(view.fixed), dict(view.coordinates)
     for extra in order[3:]:

@@ -1,4 +1,4 @@
-"""Selection that a user made: files, directories, and values of axes."""
+"""Files, directories and values of axes that a user selects."""
 
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ from cspr_jax.store.reading.result import Result
 
 # A requested value may lie outside the range of an axis by this fraction of its coordinates.
 SAME = 1e-9
-LONGEST_NAMES = 64  # letters of a first line that tell whose table it is
+LONGEST_NAMES = 64  # number of letters of the first line that are read to recognise a table of this program
 
 
 def result_at(path: Path) -> Path:
@@ -25,7 +25,7 @@ def result_at(path: Path) -> Path:
 
 
 def is_own_motion(path: Path) -> bool:
-    """Tell whether a file is a motion of a user's own, and not one of this program's files."""
+    """Tell whether a file is a user's own motion, not a file of this program."""
     if path.suffix.lower() in (".h5", ".hdf5", ".nc") or not path.is_file():
         return False
     with path.open("rb") as file:
@@ -33,7 +33,7 @@ def is_own_motion(path: Path) -> bool:
 
 
 def coordinates_of(words: list[str], option: str = "--at") -> dict[str, float]:
-    """Values of axes as the command line gives them."""
+    """Values of axes from words of the command line."""
     at = {}
     for text in words:
         axis, _, number = text.partition("=")

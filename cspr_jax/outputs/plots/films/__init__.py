@@ -1,1 +1,1 @@
-"""Films of motions, and replays."""
+"""Films of motions, and pictures of replays in MuJoCo."""

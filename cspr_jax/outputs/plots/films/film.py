@@ -32,17 +32,17 @@ from cspr_jax.schema.quantities import FAILURES
 
 ENDINGS = (".gif", ".mp4", ".html")
 RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
-# Pictures per second: the first rate with which a film has no more pictures than allowed, else the last one. The delays
-# of a GIF are whole hundredths of a second.
+# Pictures per second: a film has the first of these rates with which its pictures are not too many, else the last one.
+# The delays of a GIF are multiples of a hundredth of a second.
 RATES = (20, 10, 5, 2, 1)
-LARGEST_COUNT, OF_PAGES = 600, 150  # pictures of a film; those of a page are stored completely
+LARGEST_COUNT, OF_PAGES = 600, 150  # largest numbers of pictures of a film, and of a page, which stores each in full
 FIGURE_SIZE, DPI = (10.0, 7.2), 90
-# Height over width below which a robot lies above its tensions, and not beside them.
+# Height over width below which the robot is drawn above its tensions instead of beside them.
 WIDE = 0.85
-# Browsers hardly open a page of more MB than this.
+# MB; browsers hardly open larger pages.
 LARGEST = 100.0
 TIME_COLOUR = "#D55E00"
-# Lines behind the clock would cross its digits.
+# White box behind the clock, so that no lines cross its digits.
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
 
@@ -63,7 +63,7 @@ def film(
     seconds = float(time[-1] - time[0]) / speed
     maximum = OF_PAGES if ending == ".html" else LARGEST_COUNT
     rate = next((rate for rate in RATES if seconds * rate <= maximum), RATES[-1])
-    # The last picture shows the end, and comes at most a fraction of a picture's time too late.
+    # The last picture shows the end, less than the time of a picture too late.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
     times = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
     rows = np.clip(np.searchsorted(time, times - 1e-9), 0, len(time) - 1)
@@ -80,7 +80,7 @@ def film(
 
 
 def _named_by_content(page: bytes) -> bytes:
-    # matplotlib names the parts of a page at random; the same film has the same bytes, two films different names.
+    # matplotlib names parts of a page at random: replace these names, so that the same film has the same bytes.
     match = RANDOM.search(page)
     if match is None:
         return page
@@ -114,7 +114,7 @@ def _writer(ending: str, rate: int) -> AbstractMovieWriter:
 
 
 class _Picture:
-    # This figure has artists that are moved from row to row.
+    # The figure, whose moving artists are updated for each row.
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ class _Picture:
         self._colours = colours_of_tension()
         self.figure = MovingFigure(figsize=FIGURE_SIZE, layout="constrained")
         points = self._drawn_points()
-        # A robot that is wide gets the width, one that is high the height.
+        # A wide robot gets the full width, a high one the full height.
         if shape_of(points) < WIDE:
             grid = self.figure.add_gridspec(2, 1, height_ratios=[1.0, 0.36])
         else:
@@ -150,7 +150,7 @@ class _Picture:
         self._draw_space(points, is_down=robot_file.z_axis == "down")
         self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, plan_file))
         self.figure.suptitle(title)
-        # Lay the figure out once: positions of axes do not change.
+        # Lay the figure out once, since its axes do not move.
         self.show(0)
         fit(self.figure)
         fill_panels(self.figure)

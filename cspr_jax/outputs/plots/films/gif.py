@@ -1,4 +1,4 @@
-"""Films as GIF: at most 256 colours, which all pictures share; choosing them takes longer than drawing."""
+"""Films as GIF: at most 256 colours for all pictures together, since choosing colours takes longer than drawing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from PIL import Image
 from cspr_jax.numerics.shapes import Int
 from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
 
-# Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
+# Number of pictures from which colours are taken; number of colours that are kept exactly, such as white and greys,
+# which cover most of a picture; and number of all colours.
 SAMPLES, EXACT, COLOURS = 8, 32, 256
 
 
@@ -39,20 +40,20 @@ class GifWriter(AbstractMovieWriter):
 
 
 def shared_colours(pictures: list[np.ndarray]) -> Int[np.ndarray, "n 3"]:
-    """Colours for pictures: their most frequent ones as they are, and means of the others."""
+    """Colours for pictures: the most frequent ones exactly, and means of the others."""
     numbers, counts = np.unique(np.stack([_number(picture) for picture in pictures]), return_counts=True)
     order = np.argsort(-counts, kind="stable")
     colours, counts = _colour(numbers[order]), counts[order]
     if len(colours) <= COLOURS:
         return colours
-    # The square root lets thin lines have colours beside wide areas.
+    # The square root gives thin lines colours of their own in spite of large areas.
     weighted = np.repeat(colours[EXACT:], np.sqrt(counts[EXACT:]).astype(int), axis=0)
     means = Image.fromarray(weighted[None]).quantize(COLOURS - EXACT).getpalette() or []
     return np.concatenate([colours[:EXACT], np.reshape(means, (-1, 3)).astype(np.uint8)])
 
 
 def _in_colours(picture: np.ndarray, colours: np.ndarray, nearest: np.ndarray) -> Image.Image:
-    # Pillow looks for the nearest colour by six bits of eight, which makes white grey. `nearest` keeps what was found.
+    # Pillow finds the nearest colour by six of eight bits, which makes white grey. `nearest` caches results.
     numbers = _number(picture)
     new = np.unique(numbers[nearest[numbers] < 0])
     differences = _colour(new).astype(int)[:, None] - colours.astype(int)

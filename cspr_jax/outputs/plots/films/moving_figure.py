@@ -1,4 +1,4 @@
-"""A figure of which few artists move from picture to picture, so that the others are drawn once."""
+"""A figure in which few artists move from picture to picture; all others are drawn once."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from cspr_jax.numerics.shapes import Int
 
 
 class MovingFigure(Figure):
-    """Pictures of the same axes; writers of films get them by `savefig`."""
+    """Figure whose pictures differ in the moving artists; writers of films get them by `savefig`."""
 
     def draw_background(self, moving: Collection[Artist], dpi: float) -> None:
-        """Draw what lies behind the artists that move."""
+        """Draw everything behind the moving artists."""
         self.set_dpi(dpi)
         self._agg = FigureCanvasAgg(self)
         self._front = [artist for panel in self.axes for artist in _in_front(panel, moving)]
@@ -29,7 +29,7 @@ class MovingFigure(Figure):
         self._background = self._agg.copy_from_bbox(self.bbox)
 
     def picture(self) -> Int[np.ndarray, "height width 4"]:
-        """The figure as it is now."""
+        """The current picture."""
         self._agg.restore_region(self._background)
         renderer = self._agg.get_renderer()
         for artist in self._front:
@@ -45,8 +45,8 @@ class MovingFigure(Figure):
 
 
 def _in_front(panel: Any, moving: Collection[Artist]) -> list[Artist]:
-    # Return what the panel draws from its first moving artist on, which would else lie behind it. A legend beside the
-    # panel's area meets nothing that moves, and takes as long to draw as all of that.
+    # Artists to draw for each picture: from the first moving artist on, all that lie in front of it. A legend beside
+    # the panel overlaps nothing that moves, and would take as long to draw as all of these.
     drawn = sorted((artist for artist in panel.get_children() if artist is not panel.patch), key=Artist.get_zorder)
     first = next((index for index, artist in enumerate(drawn) if artist in moving), len(drawn))
     return [

@@ -1,4 +1,4 @@
-"""A plan beside its motion in MuJoCo: both paths, and over time how far paths and tensions deviate."""
+"""A plan and its motion in MuJoCo: both paths, and the deviations of path and tensions over time."""
 
 from typing import Any
 
@@ -12,11 +12,11 @@ from cspr_jax.outputs.plots.style.fitting import legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, line_style
 from cspr_jax.outputs.table_layout import two_digits
 
-# A path lies in a plane if its extent across is below this fraction of its length: typed numbers are rounded.
+# A path is planar if its extent across is below this fraction of its length: typed numbers are rounded.
 ONE_PLANE = 1e-9
-BOUNDARIES = 200  # of longer plans the lines would hide the rest
+BOUNDARIES = 200  # largest number of segments whose boundaries are drawn: more lines would hide the rest
 RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
-WINDOWS = 250  # of time, each with its largest deviation
+WINDOWS = 250  # number of windows of time, each of which shows its largest deviation
 
 
 def replay_figure(replay: PlayedPlan) -> Figure:
@@ -59,7 +59,7 @@ def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
 
 
 def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) -> None:
-    # Draw the largest value of each window: rounding is noise, which would fill the panel.
+    # Draw the largest value of each window, since deviations are noise of rounding, which would fill the panel.
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]
     drawn = {name: _largest(deviations, starts) for name, deviations in values.items()}
@@ -76,7 +76,7 @@ def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) 
 
 
 def _whole_decades(panel: Axes, values: np.ndarray) -> None:
-    # The axis goes from one power of ten to another, so that at least two ticks have their numbers.
+    # The axis extends from one power of ten to another, so that at least two ticks have numbers.
     positive = values[np.isfinite(values) & (values > 0.0)]
     if not len(positive):
         return
@@ -89,6 +89,6 @@ def _whole_decades(panel: Axes, values: np.ndarray) -> None:
 
 
 def _largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    # Return the largest value of each window; a value of exactly 0 leaves a gap.
+    # Largest value of each window; a value of exactly 0 leaves a gap.
     largest = np.maximum.reduceat(values, starts)
     return np.where(largest > 0.0, largest, np.nan)

@@ -12,15 +12,15 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
-# A pose is outside where one of these margins is not positive.
+# Margins of conditions of a workspace: a pose is outside where one of them is not positive.
 MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "length_margin", "speed_margin")
-# Reasons to be outside whose margins files of earlier versions do not hold.
+# Margins that files of earlier versions lack, with the flags that report their conditions there.
 LATER = {"floor_margin": Verdict.BELOW_FLOOR, "length_margin": Verdict.CABLE_TOO_LONG}
 WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
-# Fraction of the distance between two points by which the boundary keeps off the points.
+# Smallest distance of the boundary from points of the grid, as a fraction of the distance of neighbours.
 OFF = 1e-6
-# Cuts of a simplex: each piece joins edges, named by their corners inside (first number) and outside (second). In a
-# simplex that is right-handed in the order inside, outside, triangles turn their outer side to the outside.
+# Cuts of a simplex, by its numbers of corners inside and outside: each piece joins edges, named by their corners inside
+# (first) and outside (second). In a simplex that is right-handed in this order, triangles face the outside.
 CUTS: dict[tuple[int, int], list[list[tuple[int, int]]]] = {
     (1, 2): [[(0, 0), (0, 1)]],
     (2, 1): [[(0, 0), (1, 0)]],
@@ -31,13 +31,13 @@ CUTS: dict[tuple[int, int], list[list[tuple[int, int]]]] = {
 
 
 class BoundarySides(NamedTuple):
-    """Points of a grid, and on which side of the boundary each lies.
+    """Points of a grid, and the side of the boundary on which each lies.
 
     Fields:
-        points: of each of the d axes, rising.
+        points: points of each of the d axes, increasing.
         verdict: (n_1, ..., n_d) flags; 0: inside.
-        margins: of that shape each, positive inside; NaN where not requested.
-        unmeasured: flags of reasons to be outside of which there is no margin.
+        margins: arrays (n_1, ..., n_d), positive inside; NaN where not requested.
+        unmeasured: flags of the conditions for which there is no margin.
     """
 
     points: list[np.ndarray]
@@ -47,11 +47,11 @@ class BoundarySides(NamedTuple):
 
 
 class Boundary(NamedTuple):
-    """A closed boundary: it runs along the end of the grid where points there are inside.
+    """A closed boundary, which follows the end of the grid where points there are inside.
 
     Fields:
-        corners: (n, d) between two neighbours on different sides, or a point at the end of the grid.
-        pieces: (m, d) corners of each: triangles whose outer side is that from which they run anticlockwise, or lines.
+        corners: (n, d) corners between two neighbours on different sides, or at the end of the grid.
+        pieces: (m, d) indices of the corners of lines, or of triangles, anticlockwise as seen from outside.
         is_end: (m,) whether a piece lies at the end of the grid, beyond which nothing is known.
     """
 
@@ -62,7 +62,7 @@ class Boundary(NamedTuple):
 
 def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> BoundarySides:
     """Points of a map of a workspace, and their sides."""
-    # The points of an axis may come in any order, and twice.
+    # The points of an axis may be in any order, and repeated.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in axes]
 
     def part(name: str) -> np.ndarray:
@@ -79,25 +79,25 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
 def boundary(sides: BoundarySides) -> Boundary:
     """The boundary of the inside, by marching simplices: six tetrahedra, or two triangles, for each cell.
 
-    It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
-    and no other, so that it separates the points exactly as their verdicts do. Where margins decide, it crosses where
-    the first of them is zero by linear interpolation; elsewhere half-way.
+    It crosses exactly those edges of the grid, and diagonals of these simplices, that join a point inside and one
+    outside, so that it separates the points as their verdicts do. Where margins decide, it crosses where the first of
+    them is zero by linear interpolation; elsewhere half-way.
     """
-    # Around the grid lies a layer without thickness that is outside.
+    # Surround the grid with a layer of zero thickness that is outside.
     is_in = np.pad(sides.verdict == 0, 1)
     number = np.pad(np.arange(sides.verdict.size).reshape(sides.verdict.shape), 1, constant_values=-1).reshape(-1)
     edges = np.concatenate([_cut(is_in.reshape(-1), corners, sign) for corners, sign in _simplices(is_in)])
     inner, outer = number[edges[..., 0]], number[edges[..., 1]]
     pairs, pieces = np.unique(np.stack([inner, outer], -1).reshape(-1, 2), axis=0, return_inverse=True)
     pieces = pieces.reshape(inner.shape)
-    # Some pieces in a layer without thickness have the same corner twice.
+    # Remove pieces in the layer of zero thickness that have the same corner twice.
     full = (np.diff(np.sort(pieces, axis=1), axis=1) > 0).all(1)
     return Boundary(_crossings(sides, pairs), pieces[full], (outer < 0).any(1)[full])
 
 
 def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    # Each cell that is cut gives d! paths from its first corner to its last, one axis after the other: (n, d + 1)
-    # indices in the flat grid, and 1 or -1 for their hand.
+    # Divide each cell that is cut into d! simplices, along paths from its first corner to its last, one axis after the
+    # other: (n, d + 1) indices in the flat grid, and 1 for right-handed ones, -1 for others.
     count = is_in.ndim
     lower = np.arange(is_in.size).reshape(is_in.shape)[(slice(-1),) * count].reshape(-1)
     steps = np.array([int(np.prod(is_in.shape[k + 1 :])) for k in range(count)])
@@ -115,7 +115,7 @@ def _hand(order: Sequence[int]) -> int:
 
 
 def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
-    # Return (n_pieces, d, 2): for each corner of a piece, the points inside and outside between which it lies.
+    # For each corner of a piece, the points inside and outside between which it lies, (n_pieces, d, 2).
     count, sides = simplices.shape[1], is_in[simplices]
     pieces = [np.empty((0, count - 1, 2), int)]
     for pattern in itertools.product((True, False), repeat=count):
@@ -129,8 +129,8 @@ def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
 
 
 def _crossings(sides: BoundarySides, pairs: np.ndarray) -> np.ndarray:
-    # Return (n, d) crossings between (n, 2) points, the first inside; a second point of -1 is beyond the end of the
-    # grid, and the crossing is at the first.
+    # Crossings (n, d) between (n, 2) points, of which the first is inside; the second is -1 beyond the end of the grid,
+    # where the crossing is at the first.
     inner, outer = pairs[:, 0], np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
     part = np.where(sides.verdict.reshape(-1)[outer] & sides.unmeasured, 0.5, np.inf)
     for margin in sides.margins:
@@ -144,7 +144,7 @@ def _crossings(sides: BoundarySides, pairs: np.ndarray) -> np.ndarray:
 
 
 def step_of(sides: BoundarySides) -> Float[np.ndarray, "n 3 2"]:
-    """The part of a plane in which the boundary may lie: between neighbours on different sides."""
+    """Triangles of a plane in which the boundary may lie: those between neighbours on different sides."""
     is_in = sides.verdict == 0
     grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
     corners = np.concatenate([simplices for simplices, _ in _simplices(is_in)])
@@ -153,7 +153,7 @@ def step_of(sides: BoundarySides) -> Float[np.ndarray, "n 3 2"]:
 
 
 def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
-    """The boundary in a plane, as long lines."""
+    """The boundary in a plane as lines, and whether each is closed."""
     surface = boundary(sides)
     lines = []
     for is_end in (True, False):
@@ -169,7 +169,7 @@ def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
 
 
 def _chains(lines: np.ndarray) -> list[np.ndarray]:
-    # Return the corners, one after the other, of pieces that meet in a corner, two at most.
+    # Corners, in order, of chains of pieces, of which at most two meet in a corner.
     ends: dict[int, list[int]] = {}
     for a, b in lines.tolist():
         ends.setdefault(a, []).append(b)

@@ -26,9 +26,9 @@ from cspr_jax.store.reading.result import Result
 PLANES = [["x", "y"], ["x", "z"], ["y", "z"]]
 SPACE = ("x", "y", "z")
 SIDE, ALONE = 3.1, 5.2  # inches, the longer side of a panel
-# Spools are shown if the panels do not get longer than this many times the grid.
+# Spools are shown unless the panels would get longer than this multiple of the grid.
 LARGEST_RATIO, MARGIN = 1.5, 0.04
-OPACITY = 0.18  # opacity
+OPACITY = 0.18  # opacity of the areas in which boundaries may lie
 _END: dict[str, Any] = {"linestyle": ":", "linewidth": 0.7}
 
 
@@ -37,9 +37,9 @@ class Compared(NamedTuple):
 
     Fields:
         result: a map of a workspace.
-        file: its name.
+        file: name of its file.
         across: axes that vary.
-        at: index of the point, for each of the other axes.
+        at: index of the chosen point of each other axis.
     """
 
     result: Result
@@ -91,7 +91,7 @@ def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
 
 
 def _names(compared: list[Compared]) -> list[str]:
-    # Conditions tell the results apart, with robot and file where the conditions are the same.
+    # Results are named by their conditions, and by robot and file where the conditions are the same.
     words = [conditions(one.result) for one in compared]
     if len({robot_name(one.result) for one in compared}) > 1:
         words = [f"{robot_name(one.result)}: {text}" for one, text in zip(compared, words, strict=True)]
@@ -119,7 +119,7 @@ def _check(compared: list[Compared], plane: list[str]) -> None:
 
 
 def _heights(compared: list[Compared], over: str) -> np.ndarray:
-    # Choose heights evenly among those where something is inside; among all if nothing is anywhere.
+    # Choose heights evenly among those with points inside, or among all if there are none.
     points = np.unique(compared[0].result.axes[over])
     has_inside = np.zeros(len(points), bool)
     for one in compared:
@@ -130,7 +130,7 @@ def _heights(compared: list[Compared], over: str) -> np.ndarray:
 
 
 def _points(one: Compared, axis: str) -> np.ndarray:
-    # Return the drawn points of an axis out of the plane.
+    # Drawn points of an axis out of the plane.
     if axis in one.across:
         return np.unique(one.result.axes[axis])
     return np.array([one.coordinates[axis]]) if axis in one.coordinates else np.empty(0)
@@ -141,7 +141,7 @@ def _agree(points: np.ndarray, others: np.ndarray) -> bool:
 
 
 def _box(compared: list[Compared], plane: list[str]) -> np.ndarray:
-    # Return (2, 2) corners around the grids, and around the spools unless they are far.
+    # Corners (2, 2) of a rectangle around the grids, and around the spools unless these are far away.
     grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in compared for f in (np.min, np.max)])
     base = np.array(robot_of(compared[0].result).base_points)
     both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
@@ -158,8 +158,8 @@ def _figure_size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]
 
 def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist]:
     # The line is thin along the end of the grid, beyond which nothing is known.
-    # Margins of different conditions have different scales, so that zeros between their values would not compare: the
-    # line runs half-way between points on different sides, as volumes count them, in an area as wide as that step.
+    # Margins of different conditions have different scales, so that their interpolated zeros could not be compared: the
+    # line runs half-way between points on different sides, as for volumes, within an area that is as wide as the step.
     plain, ends = sides._replace(margins=[]), False
     _draw_step(panel, plain, number)
     for corners, is_end in outlines(plain):

@@ -9,14 +9,14 @@ from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.reading.result import Result
 
-# Margins of the conditions of a workspace: a pose is inside where all requested margins are positive.
+# Margins of the conditions of a workspace, in words: a pose is inside where all requested margins are positive.
 MARGINS = {
     "static": "wrench_margin",
     "wrench-feasible": "wrench_margin",
     "wrench-closure": "closure_margin",
     "interference-free": "clearance",
 }
-# A picture says this of cells that a margin counts as inside, but that are not in the workspace.
+# Words for cells with a positive margin that are not in the workspace.
 EXCLUDED = "excluded by other conditions"
 SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "every"}
 
@@ -37,7 +37,7 @@ def shown_first(result: Result) -> str:
     if is_workspace(result) and len({MARGINS[name] for name in workspace_of(result).conditions}) > 1:
         return "verdict"
     names = [*pictured, *result.data]
-    # A margin that is not requested has no picture.
+    # Skip margins that were not requested.
     return next((name for name in names if not np.isnan(result.data[name]).all()), names[0])
 
 
@@ -82,7 +82,7 @@ def _tensions(limits: dict, robot: RobotFile) -> str:
 
 
 def _numbers(limit) -> str:
-    # Write one number if all cables have it, else the range of their numbers.
+    # Write one number if it is the same for all cables, else the range of their numbers.
     low, high = np.min(limit), np.max(limit)
     return f"{low:.4g}" if low == high else f"{low:.4g} .. {high:.4g}"
 

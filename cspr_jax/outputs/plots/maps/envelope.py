@@ -15,7 +15,7 @@ from cspr_jax.store.reading.result import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17
-# The wide line shows on both sides of the narrow one where both have the same outline.
+# The wide line is visible on both sides of the narrow one where both outlines coincide.
 _ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
@@ -46,10 +46,10 @@ def envelope_figure(
             xlabel="tilt · cos azimuth (°)",
             ylabel="tilt · sin azimuth (°)",
         )
-        # A label that is turned by matplotlib may stand on its head.
+        # Labels that matplotlib rotates may be upside down.
         panel.zaxis.set_rotate_label(False)
         panel.set_zlabel("torsion (°)", rotation=90.0)
-        # An axis has few ticks, since it may be seen nearly from its end.
+        # Use few ticks, since an axis may be seen nearly from its end.
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 3, 4.5, 9, 10], prune="both"))
     handles = [Line2D([], [], color=colour, linewidth=width) for colour, width in (_ACCESSIBLE, _ATTAINED)]
@@ -62,7 +62,7 @@ def envelope_figure(
 def _outline(
     panel, azimuth: np.ndarray, tilt: np.ndarray, inside: np.ndarray, height: float, style: tuple[str, float]
 ) -> None:
-    # Outline (n_azimuths, n_tilts) cells. The first azimuth comes again, and one tilt beyond, so that the line closes.
+    # Outline (n_azimuths, n_tilts) cells. Repeat the first azimuth and add one more tilt, so that the line closes.
     around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
     outward = np.degrees(np.append(tilt, 2.0 * tilt[-1] - tilt[-2]))
     x, y = (np.outer(f(around), outward) for f in (np.cos, np.sin))

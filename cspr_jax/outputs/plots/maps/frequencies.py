@@ -1,4 +1,4 @@
-"""Feasible frequencies of ellipses over one axis, such as the radius of a circle: the band between two ends."""
+"""Feasible frequencies of ellipses over one axis, such as the radius of a circle, as a band."""
 
 from typing import Any
 
@@ -13,15 +13,15 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, as_drawn, axis_label, i
 from cspr_jax.outputs.plots.style.layout import in_degrees
 from cspr_jax.store.reading.result import Result
 
-# Quantities that the picture shows; a result without them has none.
+# Quantities that the picture needs.
 SHOWN = ("lowest_frequency", "highest_frequency", "natural_frequency", "used_frequency", "verdict")
 SIZES = ("circle_radius", "scale")
-# Quantities that hold at one frequency.
+# Quantities that belong to the frequency in use.
 AT_A_FREQUENCY = ("verdict", "margin", "used_frequency", "binding_cable", "duration", "tension_margin", "limit_margin")
-# Largest top of the picture, over the largest natural frequency: ends may lie far above, or at infinity.
+# Largest upper end of the picture, over the largest natural frequency: the band may extend far above, or to infinity.
 HIGHEST = 2.5
-FINE = 1001  # points along the band
-HIGHEST_SHOWN = 1e6  # rad/s, in place of infinity
+FINE = 1001  # number of points along the band
+HIGHEST_SHOWN = 1e6  # rad/s, replaces infinity
 BAND_COLOUR, EDGE = "#cfe3f1", COLOURS[0]
 NATURAL: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.1}
 BEST: dict[str, Any] = {"color": COLOURS[1], "linewidth": 2.4}
@@ -80,7 +80,7 @@ def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.nd
 
 
 def turns_in_words(result: Result, name: str) -> list[str]:
-    """Phrases for the title of a map of ellipses: their size, and at which frequency they are run."""
+    """Phrases for the title of a map of ellipses: their size and frequency."""
     if result.attributes.get("map") != "ellipse" or not result.settings:
         return []
     ellipse, words = table(result.settings, "ellipse"), []
@@ -101,15 +101,15 @@ def _rule(result: Result) -> str | float:
 
 
 def _top(high: np.ndarray, natural: np.ndarray) -> float:
-    # Ends that rise to infinity leave the picture.
+    # Do not extend the picture for ends of the band that rise to infinity.
     usual = HIGHEST * float(np.nanmax(natural, initial=0.0))
     largest = float(np.max(high[np.isfinite(high)], initial=0.0))
     return min(usual, 1.1 * largest) if usual > 0.0 and largest > 0.0 and np.isfinite(high).all() else usual or 1.0
 
 
 def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> list[float]:
-    # The static limit lies between two points, of which only one has the lowest frequency 0. From the limit on, the
-    # square of that frequency rises linearly with the axis, or with the inverse of a size.
+    # Find static limits: between two points, of which one has the lowest frequency 0. Beyond the limit the square of
+    # that frequency rises linearly with the axis, or with the inverse of a size.
     limits = []
     with np.errstate(divide="ignore"):
         along = 1.0 / points if is_size else points
@@ -130,7 +130,7 @@ def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> lis
 
 
 def _draw_band(panel: Axes, points: np.ndarray, low: np.ndarray, high: np.ndarray, limits: list[float]) -> None:
-    # The lower end rises from each static limit as a root does, the upper one falls from infinity as an inverse root.
+    # The lower end rises from each static limit like a square root, the upper one falls from infinity like its inverse.
     positions = np.unique(np.concatenate([np.linspace(points[0], points[-1], FINE), points, limits]))
     squares = np.interp(positions, *_joined(points, low**2, limits)), np.interp(positions, points, high**-2.0)
     below, above = np.sqrt(squares[0]), np.maximum(squares[1], HIGHEST_SHOWN**-2.0) ** -0.5

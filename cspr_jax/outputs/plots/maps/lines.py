@@ -31,7 +31,7 @@ from cspr_jax.outputs.plots.style.word_ticks import worded
 from cspr_jax.store.reading.result import Result
 
 LINES = len(COLOURS)
-# Mark of a point of a margin that other conditions exclude.
+# Symbol of points that conditions other than that of a margin exclude.
 CROSSES: dict[str, Any] = {"marker": "x", "linestyle": "", "color": "black", "markersize": 5}
 
 
@@ -40,10 +40,10 @@ class PlottedLine:
     """One line of a picture.
 
     Fields:
-        points: (n,) along the axis.
-        values: (n,).
-        name: for the legend; empty for none.
-        excluded: (n,) points that are excluded by other conditions than that of the values; None: no point.
+        points: (n,) coordinates along the axis.
+        values: (n,) values of the quantity.
+        name: name in the legend; empty for none.
+        excluded: (n,) whether conditions other than that of the values exclude a point; None: no point is excluded.
     """
 
     points: np.ndarray
@@ -74,7 +74,7 @@ def line_figure(
     if any(line.name for line in drawn[0]):
         handles = axes[0].lines[: len(drawn[0])]
         legend = axes[0].legend(handles, [""] * len(handles), frameon=True, framealpha=0.9, fontsize="small")
-        # Texts are set afterwards, since matplotlib leaves out a name that begins with an underscore.
+        # Set texts afterwards, since matplotlib leaves out names that begin with an underscore.
         for text, line in zip(legend.get_texts(), drawn[0], strict=True):
             text.set_text(line.name)
     if any(line.excluded is not None and line.excluded.any() for lines in drawn for line in lines):
@@ -84,7 +84,7 @@ def line_figure(
 
 
 def _as_drawn(result: Result, name: str, across: str, line: PlottedLine) -> PlottedLine:
-    # The points of an axis may come in any order.
+    # The points of an axis may be in any order.
     order = np.argsort(line.points, kind="stable")
     points, data = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
     return PlottedLine(points, data, line.name, None if line.excluded is None else line.excluded[order])
@@ -110,7 +110,7 @@ def _draw(panel: Axes, lines: list[PlottedLine]) -> None:
 
 
 def _in_words(result: Result, name: str, groups: list[list[PlottedLine]]) -> tuple[list[list[PlottedLine]], list[str]]:
-    # Values that stand for words become numbers from 0 on, one above the other, with their words.
+    # Replace values that stand for words by numbers from 0 on, which become the ticks of these words.
     arrays = [line.values for lines in groups for line in lines]
     meaning = worded(result, name, np.concatenate(arrays))
     if meaning is None:

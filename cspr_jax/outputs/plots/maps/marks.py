@@ -1,4 +1,4 @@
-"""Marks in a section of a map beside its cells: the spools, P0, and the start of the motions."""
+"""Marks in a section of a map: the spools, P0, and the start of the motions."""
 
 from typing import Any, NamedTuple
 
@@ -15,13 +15,13 @@ from cspr_jax.outputs.plots.style.fixed_axes import start, starts_at_rest, table
 from cspr_jax.outputs.plots.style.labels import as_drawn
 from cspr_jax.store.reading.result import Result
 
-# Axes of one and the same space: of the targets, or of the start points.
+# Axes of the same space: of the targets, or of the start points.
 OF_TARGETS, OF_STARTS = ("x", "y", "z", "radius", "azimuth"), ("from_x", "from_y", "from_z")
 _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
 
 
 class _Section(NamedTuple):
-    # A section, for its marks: its space, its axes, their names without "from_", its coordinates, the spools.
+    # Section in which to mark points: its space, axes, their names without "from_", coordinates, and the spools.
     panel: Axes | None
     result: Result
     space: tuple[str, ...]
@@ -39,10 +39,10 @@ class _Section(NamedTuple):
 def draw_marks(
     panel: Axes, result: Result, name: str, across: list[str], coordinates: dict[str, float]
 ) -> dict[str, Artist]:
-    """Draw spools, P0 and the fixed end of the motions, as far as they belong into a section and fit into its range.
+    """Draw spools, P0 and the fixed end of the motions, as far as they lie within the range of a section.
 
-    P0 and that end are marked only where the section contains them, to half a step of the grid. The spools are
-    projected onto it.
+    P0 and the fixed end are marked only in sections that contain them, to half a step of the grid. The spools are
+    projected onto the section.
     """
     section = _section(panel, result, across, coordinates)
     if section is None:
@@ -53,7 +53,7 @@ def draw_marks(
         if _contains(section, point):
             at = _drawn(section, point[None])
             if _inside(limits, at).any():
-                # Both are seen where they fall together: the plus lies within the circle.
+                # Both are visible where they coincide, since the plus lies within the circle.
                 symbol, marker_size, layer = ("P", 6.0, 2.6) if words == "P0" else ("o", 9.0, 2.5)
                 artists[words] = panel.plot(*at[0], symbol, markersize=marker_size, zorder=layer, **_EDGE)[0]
     panel.set(xlim=limits[0], ylim=limits[1])
@@ -76,7 +76,7 @@ def marked(result: Result, name: str, across: list[str], over: str, coordinates:
 
 
 def _section(panel: Axes | None, result: Result, across: list[str], coordinates: dict[str, float]) -> _Section | None:
-    # Return None where nothing of this space can be marked.
+    # None where nothing can be marked in this space.
     space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
     base = np.asarray(result.attributes.get("base_points", 0.0), float)
     if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
@@ -85,7 +85,7 @@ def _section(panel: Axes | None, result: Result, across: list[str], coordinates:
 
 
 def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
-    # Return P0, and the end that all motions share, by their words.
+    # P0, and the end that all motions share, by their names in the legend.
     words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.coordinates)
     points = {"P0": _rest_point(section, name)}
     if all(axis in end for axis in "xyz"):
@@ -94,13 +94,13 @@ def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
 
 
 def _rest_point(section: _Section, name: str) -> np.ndarray | None:
-    # P0 lies below the centroid of the spools; None where it is not one point.
+    # P0, which lies below the centroid of the spools; None where it differs within the map.
     coordinates, result = section.coordinates, section.result
     frame, depth = frame_of(section.base, str(result.attributes.get("z_axis", "down"))), coordinates.get("z0")
     if "z0" in result.choices or "inclination" in result.choices:
         return None
     if depth is None and "z" in coordinates and starts_at_rest(result, name):
-        # z0 is chosen for each target: its own depth, or by the inclination.
+        # z0 is chosen for each target: the target's depth, or a depth by the inclination.
         setting = table(result.settings, "trajectory").get("inclination")
         inclination = coordinates.get("inclination", 0.0 if setting is None else setting)
         if isinstance(inclination, float) and inclination > -1.0:
@@ -109,7 +109,7 @@ def _rest_point(section: _Section, name: str) -> np.ndarray | None:
 
 
 def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: float | None) -> np.ndarray:
-    # Return one coordinate of (n, 3) points. In a vertical half-plane it is that of their projections onto it.
+    # A coordinate of (n, 3) points; in a vertical half-plane, the coordinate of their projections.
     if name in "xyz":
         return points[:, "xyz".index(name)]
     x, y = (points - centre)[:, :2].T
@@ -119,7 +119,7 @@ def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: floa
 
 
 def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
-    # Return (n, 2) of (n, 3), in the units of the picture; an azimuth lies within the revolution that the axis shows.
+    # Points (n, 3) as drawn, (n, 2), in the units of the picture; azimuths are within the revolution of the axis.
     columns = []
     for axis, name in zip(section.across, section.names, strict=True):
         column = _coordinate(name, points, section.centre, section.coordinates.get("azimuth"))
@@ -149,7 +149,7 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
         nearest = int(np.argmin(np.abs(gaps)))
         ordered = np.unique(points)
         steps = np.diff(ordered)
-        # Take the step towards the point; beyond the last step, the last one.
+        # The step of the grid on the side of the point; beyond the last point, the last step.
         side = int(np.searchsorted(ordered, points[nearest])) - (gaps[nearest] > 0.0)
         step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(current))
         if points[nearest] != current or abs(gaps[nearest]) > 0.5 * step:
@@ -164,7 +164,7 @@ def _spools(section: _Section) -> dict[str, Artist]:
     polar = isinstance(panel, PolarAxes)
     if "radius" in names and "azimuth" not in (*section.coordinates, *names):
         return {}
-    # Two cables may share a spool; the order is the cables'.
+    # Draw each spool once, in the order of the cables, which may share spools.
     flat = base[:, :2] if polar else _drawn(section, base)
     _, first = np.unique(np.round(flat, 9), axis=0, return_index=True)
     base, flat = base[np.sort(first)], flat[np.sort(first)]
@@ -190,21 +190,21 @@ def _spools(section: _Section) -> dict[str, Artist]:
         return {}
     if symbol:
         return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **style)}
-    # The legend shows the same shape.
+    # Draw the same shape for the legend.
     middle, extent = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
     shape = Path(np.concatenate([flat, flat[:1]]) / extent - middle / extent, closed=True)
     return {"spools": Line2D([], [], marker=shape, markersize=13, markerfacecolor="none", color="black", linestyle="")}
 
 
 def _inside(limits: tuple, points: np.ndarray) -> np.ndarray:
-    # Points on an edge are seen, too.
+    # Points on an edge count as inside.
     low, high = (np.array([f(pair) for pair in limits]) for f in (min, max))
     slack = 0.01 * (high - low)
     return np.all((points >= low - slack) & (points <= high + slack), axis=1)
 
 
 def _crosses(points: np.ndarray) -> bool:
-    # Tell whether two sides of the closed polygon cross, other than at a common corner.
+    # Tell whether two sides of a closed polygon cross, except at a common corner.
     ends = np.roll(points, -1, axis=0)
 
     def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:

@@ -10,7 +10,7 @@ from cspr_jax.outputs.plots.maps.conditions import shown_first
 from cspr_jax.schema.quantities import RATIO
 from cspr_jax.store.reading.result import Result
 
-# Points of axes whose relative difference is less are the same.
+# Points of axes whose relative difference is less than this are the same.
 SAME = 1e-9
 PAIR = 2
 

@@ -1,4 +1,4 @@
-"""Sections of maps, in colours."""
+"""Sections of maps, with a colour for each cell."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from cspr_jax.store.reading.result import Result
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
-# A top view: straight from above, in true shape.
+# Axes of a view from above, drawn in its true shape.
 AROUND = ("azimuth", "radius")
-# Pairs of axes that make a plane, the second upward or, in polar coordinates, outward. A picture shows the first pair
-# that varies, or else the pair with the most cells.
+# Pairs of axes that span a plane, the second of which is drawn upward or, in polar coordinates, outward. A picture
+# shows the first pair that varies, or else the pair with the most cells.
 PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
 OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 HATCH = "////"
@@ -53,13 +53,12 @@ class PlaneSection(NamedTuple):
     """Content of sections of a map.
 
     Fields:
-        name: of the quantity.
+        name: name of the quantity.
         across: the two axes of a panel.
         over: the axis that differs between the panels; None: there is one panel.
-        coordinates: of axes fixed for the picture.
+        coordinates: coordinates on the fixed axes.
         fixed: words for the constants.
-        excluded: (n_first, n_second, n_panels) cells that are excluded by other conditions than that of the
-            quantity.
+        excluded: (n_first, n_second, n_panels) cells that conditions other than that of the quantity exclude.
     """
 
     name: str
@@ -87,12 +86,12 @@ def section_figure(
         shown = _moved(shown, marked(result, name, across, over, alone))
     figure = Figure(figsize=_figure_size(result, across, len(shown)), layout="constrained")
     axes, bottom, left = panels(figure, len(shown), polar=polar)
-    # The points of an axis may come in any order, and twice.
+    # The points of an axis may be in any order, and repeated.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
     excluded = section.excluded[np.ix_(*orders, shown)]
-    # An infinite deficit is beyond all scales, and has no colour.
+    # Cells of -inf are beyond all scales, and have no colour.
     endless = np.isneginf(data) if data.dtype.kind == "f" else np.zeros(data.shape, bool)
     data = np.where(endless, np.nan, data) if endless.any() else data
     quantity = EVERY[name]
@@ -133,7 +132,7 @@ def section_figure(
 
 
 def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
-    # Among evenly chosen sections, move the nearest ones to where there is something to mark.
+    # Choose sections evenly, but replace those nearest to sections with marks by the latter.
     indices = shown.tolist()
     for index in marked_indices:
         if index not in indices:
@@ -144,7 +143,7 @@ def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
 
 
 def _figure_size(result: Result, across: list[str], count: int) -> tuple[float, float]:
-    # Return inches. Panels in metres have the shape of their range.
+    # Width and height of a panel in inches; panels in metres have the shape of their range.
     columns = columns_of(count)
     side = SINGLE if count == 1 else PANEL
     width, height = side, side
@@ -171,7 +170,7 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
 
 
 def is_informative(name: str, data: np.ndarray) -> np.ndarray:
-    """Cells that say more than "nothing here": most orientations of a grid are impossible for the robot."""
+    """Cells that contain information: most orientations of a grid are impossible for the robot."""
     if EVERY[name].unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
@@ -180,12 +179,12 @@ def is_informative(name: str, data: np.ndarray) -> np.ndarray:
 def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], points: list[np.ndarray], scale: Scale):
     x, y = map(edges, points)
     if isinstance(panel, PolarAxes):
-        # Sides of a cell are straight: narrow ones look round.
+        # Divide cells into narrow ones, whose straight sides look round.
         parts = int(min(120.0, np.ceil(np.diff(x).max() / 3.0)))
         x = np.interp(np.arange(parts * (len(x) - 1) + 1) / parts, np.arange(len(x)), np.radians(x))
         y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
     if cells.dtype.kind == "f":
-        # Infinite values lie beyond an end of the scale; only NaN is drawn as no value.
+        # Infinite values have the colour beyond the end of the scale; only NaN has no colour.
         cells = np.ma.masked_invalid(np.clip(cells.astype(float), -LARGEST, LARGEST))
     image = panel.pcolormesh(x, y, cells.T, cmap=scale.colours, norm=scale.norm, rasterized=True)
     if _equal(result, across):
@@ -196,7 +195,7 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
 
 
 def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
-    # Draw one path of all cells, so that the lines of the hatch go on from one cell to the next.
+    # Draw all cells as one path, so that the hatching continues from cell to cell.
     if not cells.any():
         return
     x, y = map(edges, points)
@@ -208,18 +207,18 @@ def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
 
 
 def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
-    # Lines where a whole number of oscillations is just too few: on horizontal transitions they are the hexagons of
-    # thesis Fig. 1.6.
+    # Draw lines where an integer number of oscillations just does not suffice: for horizontal transitions these are the
+    # hexagons of thesis Fig. 1.6.
     levels = np.arange(1.0, np.nanmax(np.where(np.abs(cells) < 1e4, cells, np.nan), initial=1.0))
     if min(cells.shape) < 2 or not 0 < len(levels) <= 40:
         return
     lines = panel.contour(*points, cells.T, levels=levels, colors="white", linewidths=0.8)
     for text in panel.clabel(lines, fmt="%d", fontsize="small"):
-        text.set_rotation(0.0)  # turned, a 6 could be a 9
+        text.set_rotation(0.0)  # rotated, a 6 could be read as a 9
 
 
 def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
-    """The scale of a quantity whose numbers are no words."""
+    """The scale of a quantity whose values are numbers, and do not stand for words."""
     choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
     points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))
     if not 0 < len(points) <= TOLD_APART:

@@ -28,18 +28,18 @@ from cspr_jax.store.reading.result import Result
 SPACE = ["x", "y", "z"]
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
 BACK, FRONT = 0.4, 0.3  # opacities
-# Inches: width of the box, height of title and legend, and heights of the picture.
+# Inches: width of the box, height of title and legend, and smallest and largest height of the picture.
 ACROSS, BESIDE, LOW, HIGH = 6.8, 1.3, 3.6, 7.6
 
 
 class _Eye(NamedTuple):
-    # Signs of the axes of the picture in those of the file, and the direction towards the eye in the latter.
+    # Signs from axes of the file to axes of the picture, and the direction to the viewer in axes of the file.
     signs: np.ndarray
     towards: np.ndarray
 
 
 class _LevelLines(Line3DCollection):
-    # Lines of a surface at the heights of the ticks, wherever these are in the end.
+    # Contour lines of a surface at the heights of the ticks, which are known only when the picture is drawn.
 
     def __init__(self, triangles: np.ndarray, panel: Axes3D, layer: float) -> None:
         self._triangles, self._panel = triangles, panel
@@ -86,7 +86,7 @@ def is_solid(result: Result) -> bool:
 
 
 def middle_of(sides: BoundarySides) -> Float[np.ndarray, "3"]:
-    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest."""
+    """The centroid of the points inside, or the nearest point inside where the centroid is outside."""
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]
     middle = inside.mean(0)
@@ -97,13 +97,13 @@ def middle_of(sides: BoundarySides) -> Float[np.ndarray, "3"]:
 
 
 def _draw_surface(panel: Axes3D, surface: Boundary, eye: _Eye) -> None:
-    # Triangles that are turned away lie behind the robot, those that are turned to the eye before it.
+    # Triangles that face away from the viewer are drawn behind the robot, the others in front of it.
     triangles = surface.corners[surface.pieces]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     is_front = normals @ eye.towards > 0.0
     shades = _shades(surface, normals, eye)
     for is_drawn, opacity, layer in ((~is_front, BACK, 1.0), (is_front, FRONT, 3.0)):
-        # Triangles are opaque, and made transparent as a whole: else the edges of neighbours would show as a net.
+        # Draw triangles opaque and blend the complete surface: else edges between transparent neighbours would show.
         collection = Poly3DCollection(
             triangles[is_drawn],
             facecolors=shades[is_drawn],
@@ -119,12 +119,12 @@ def _draw_surface(panel: Axes3D, surface: Boundary, eye: _Eye) -> None:
 
 
 def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    # Return (n, 2, 3) segments in which triangles pass heights.
+    # Line segments (n, 2, 3) in which triangles intersect level planes.
     segments = []
     for height in heights:
         above = triangles[..., 2] > height
         cut = above.any(1) & ~above.all(1)
-        # The corner that lies alone on its side comes first.
+        # Put the corner first that is alone on its side of the plane.
         alone = np.argmax(above[cut] == (above[cut].sum(1, keepdims=True) == 1), axis=1)
         first, *others = (triangles[cut, (alone + k) % 3] for k in range(3))
         parts = [(height - first[:, 2:]) / (other[:, 2:] - first[:, 2:]) for other in others]
@@ -133,7 +133,7 @@ def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
 
 
 def _fainter(opacity: float, image: np.ndarray, dpi: float) -> tuple[np.ndarray, float, float]:
-    # matplotlib calls this filter twice for a collection in space.
+    # matplotlib may call this filter twice for a collection in space.
     del dpi
     faint = image.copy()
     faint[..., 3] = np.minimum(faint[..., 3], opacity)
@@ -141,7 +141,7 @@ def _fainter(opacity: float, image: np.ndarray, dpi: float) -> tuple[np.ndarray,
 
 
 def _shades(surface: Boundary, normals: np.ndarray, eye: _Eye) -> np.ndarray:
-    # Return (m, 3) colours in the light of a lamp beside the eye; normals of neighbours are mixed to hide facets.
+    # Colours (m, 3) lit by a lamp beside the viewer; normals of neighbours are averaged to hide facets.
     mixed = np.zeros(surface.corners.shape)
     for k in range(3):
         np.add.at(mixed, surface.pieces[:, k], normals)
@@ -166,13 +166,13 @@ def _draw_robot(panel: Axes3D, robot: Posed) -> None:
     panel.add_collection3d(Line3DCollection(robot.edges, colors="black", linewidths=1.2, zorder=2.2))
     for points, symbol in ((robot.base, "s"), (robot.attached, "o")):
         panel.plot(*points.T, symbol, color="black", markersize=4.0 if symbol == "s" else 2.0, zorder=2.3)
-    # A flat box is larger than its panel, which is a square.
+    # A flat box extends beyond its panel, which is a square.
     for artist in (*panel.collections, *panel.lines):
         artist.set(clip_on=False, in_layout=False)
 
 
 def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface: Boundary) -> None:
-    # An obstacle whose middle is nearer to the eye than that of the workspace lies before it.
+    # Draw an obstacle in front of the workspace if its middle is nearer to the viewer.
     middle = surface.corners.mean(0) @ eye.towards
     for points in bodies:
         faces = faces_of(points)
@@ -203,5 +203,5 @@ def volume_words(result: Result, index: dict[str, int]) -> str:
     value, error = float(volume.volume[index_of_volume]), float(volume.error[index_of_volume])
     if error == 0.0:
         return f"volume {value:.4g} m³"
-    digits = max(0, 1 - int(np.floor(np.log10(error))))  # two of the error
+    digits = max(0, 1 - int(np.floor(np.log10(error))))  # so that the error has two digits
     return f"volume {value:.{digits}f} ± {error:.{digits}f} m³"

@@ -17,27 +17,27 @@ from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
 from cspr_jax.store.reading.result import Result
 from cspr_jax.workspaces.acceleration_search import faces_of, margins_and_verdicts
 
-# Rows that are computed together: with many cables the faces of all rows would not fit into memory.
+# Number of rows computed at a time: with many cables the faces of all rows would not fit into memory.
 ROWS = 1 << 14
 
 
 @dataclasses.dataclass(frozen=True)
 class AccelerationSet:
-    """Feasible accelerations at a time. Vectors have the axes of the file, but the third one is upward.
+    """Feasible accelerations at a time. Vectors are in the axes of the file, but with z upward.
 
     Fields:
-        words: the time, such as "t = 1.2 s".
-        position: (3,) of the effector, as in the file, m.
-        actual: (3,) its acceleration, m/s^2.
+        words: words for the time, such as "t = 1.2 s".
+        position: (3,) position of the effector, as in the file, m.
+        actual: (3,) actual acceleration of the effector, m/s^2.
         margin: distance of the actual acceleration from the nearest face, m/s^2; negative outside.
         normals: (n_faces, 3) unit vectors that point inside.
-        offsets: (n_faces,) m/s^2; -inf of a face that bounds nothing.
-        names: of the faces.
+        offsets: (n_faces,) products of normals with points of the faces, m/s^2; -inf for a candidate that is no face.
+        names: names of the faces.
         cables: (n_cables, 3) unit vectors from the effector to the spools.
-        span: (n_cables,) acceleration from the smallest to the largest tension, m/s^2.
-        apex: (3,) acceleration that the smallest tensions give, m/s^2.
+        span: (n_cables,) change of acceleration from the smallest to the largest tension of each cable, m/s^2.
+        apex: (3,) acceleration at the smallest tensions, m/s^2.
         falling: (3,) acceleration of free fall, m/s^2.
-        motion: (n, 3) accelerations of the whole motion, m/s^2.
+        motion: (n, 3) accelerations of the full motion, m/s^2.
         is_planar: whether the robot moves in a plane.
     """
 
@@ -57,12 +57,12 @@ class AccelerationSet:
 
     @property
     def slacks(self) -> np.ndarray:
-        """Distances of the actual acceleration from the faces, (n_faces,); inf of a face that bounds nothing."""
+        """Distances of the actual acceleration from the faces, (n_faces,); inf for a candidate that is no face."""
         return self.normals @ self.actual - self.offsets
 
     @property
     def nearest(self) -> int:
-        """Number of the nearest face."""
+        """Index of the nearest face."""
         return int(np.argmin(self.slacks))
 
     @property
@@ -79,7 +79,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", problem=error)
     row, words = None, ""
     for axis, time in at.items():
-        row, words = nearest(result, axis, time)  # it refuses all but t
+        row, words = nearest(result, axis, time)  # refuses axes other than t
     with double_precision():
         robot, frame = (
             kernel_robot(robot_file, plan_file, file, any_cables=True),
@@ -118,7 +118,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
 
 
 def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, motion: np.ndarray) -> int:
-    # Return the row with the smallest margin.
+    # Row with the smallest margin.
     margins = []
     for first in range(0, len(positions), ROWS):
         current, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]

@@ -1,8 +1,8 @@
 """Diagram of the feasible accelerations at a time of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
 
-For a planar robot, everything is in one plane. For a spatial one, there are sections through the actual acceleration: a
-level one, a vertical one that holds zero and gravity, too, and a vertical one across the nearest face, which shows that
-face from its edge, and the margin in its true size.
+For a planar robot, everything is in one plane. For a spatial one, there are three sections through the actual
+acceleration: a level one, a vertical one that contains zero and gravity too, and a vertical one normal to the nearest
+face, which shows the margin in its true size.
 """
 
 from typing import Any, NamedTuple
@@ -21,9 +21,9 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.store.reading.result import Result
 
 X, Y, UP = np.eye(3)
-# Level parts of vectors below this, over gravity or the size of a normal, have no direction.
+# Level components shorter than this, over gravity or the norm of a normal, have no direction.
 LEVEL = 1e-6
-# Corners that are farther away than this, in sizes of the rest of the picture, do not widen it.
+# Corners farther away than this multiple of the extent of the rest do not widen the picture.
 FAR = 2.0
 _INSIDE: dict[str, Any] = {"facecolor": COLOURS[5], "alpha": 0.3, "linewidth": 0.0}
 _FACE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
@@ -47,12 +47,12 @@ class AccelerationView(NamedTuple):
     """A panel.
 
     Fields:
-        title: of the panel.
-        plane: of the section.
-        labels: of its two axes.
+        title: title of the panel.
+        plane: plane of the section.
+        labels: labels of its two axes.
         is_level: whether the section is level.
-        holds_rest: whether zero and free fall lie in it.
-        across_face: whether the nearest face is seen from its edge.
+        holds_rest: whether zero and free fall lie in the plane.
+        across_face: whether the plane is normal to the nearest face.
     """
 
     title: str
@@ -64,7 +64,7 @@ class AccelerationView(NamedTuple):
 
 
 def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figure:
-    """The diagram."""
+    """Diagram of the feasible accelerations at a time of a motion."""
     region = acceleration_set(result, file, at)
     views = _views(region)
     figure_size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)
@@ -98,7 +98,7 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
     level = AccelerationView(
         f"level, upward acceleration {height} m/s²", Plane(region.actual, X, Y), labels, is_level=True
     )
-    # An acceleration without a level part lies in every vertical section, and so does any in one of a level face.
+    # If acceleration or normal has no level component, or both are parallel, one vertical section serves both purposes.
     if along is None or across is None or abs(along @ across) > 1.0 - LEVEL:
         direction = next((direction for direction in (across, along) if direction is not None), X)
         return [level, vertical("across the nearest face", direction, holds_rest=True, across_face=True)]
@@ -110,7 +110,7 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
 
 
 def _level(vector: np.ndarray, scale: float) -> np.ndarray | None:
-    # Return the direction of the level part of a vector; None where that part is negligible beside a size.
+    # Direction of the level component of a vector; None where this component is negligible relative to a given size.
     part = np.hypot(*vector[:2])
     return np.array([*vector[:2], 0.0]) / part if part > LEVEL * scale else None
 
@@ -148,7 +148,7 @@ def _draw(panel: Axes, region: AccelerationSet, view: AccelerationView, shape: f
 
 
 def _cut_out(region: AccelerationSet, view: AccelerationView, shape: float) -> tuple[Window, Polygon]:
-    # The window holds the points to be seen, and as many corners of the section as lie near to these points.
+    # The window contains the points to be shown, and corners of the section that are not far from them.
     seen = view.plane.seen
     points = [seen(np.stack([region.actual, region.foot]))]
     if not view.is_level:
@@ -164,7 +164,7 @@ def _cut_out(region: AccelerationSet, view: AccelerationView, shape: float) -> t
 
 
 def _shows_motion(view: AccelerationView) -> bool:
-    # Across a face only where all of it is in the plane.
+    # The third section shows only what lies in its plane.
     return view.is_level or view.holds_rest
 
 
@@ -179,7 +179,7 @@ def _directions(panel: Axes, region: AccelerationSet, view: AccelerationView, wi
 
 
 def _corners(panel: Axes, region: AccelerationSet, view: AccelerationView) -> Artist:
-    # Mark where each cable's direction meets a level section while the other cables have their smallest tensions.
+    # Mark where each cable's line meets a level section while the other cables have their smallest tensions.
     lengths = (region.actual[2] - region.apex[2]) / region.cables[:, 2]
     corners = view.plane.seen(region.apex + lengths[:, None] * region.cables)
     there = (lengths >= 0.0) & (lengths <= region.span)

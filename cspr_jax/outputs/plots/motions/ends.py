@@ -1,4 +1,4 @@
-"""Start, way-points and end of a motion: marks that all can be seen where they fall together."""
+"""Start, way-points and end of a motion, with marks that stay visible where they coincide."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cspr_jax.numerics.shapes import Float, Int
 
 # More way-points than these would hide the path.
 LARGEST_COUNT = 40
-# Each mark lies within the one before it.
+# Each mark is smaller than the one before, and lies inside of it where both coincide.
 _HOLLOW: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
 LOOKS: dict[str, dict[str, Any]] = {
     "start": {"marker": "o", "markersize": 9.0, "zorder": 5.0, **_HOLLOW},

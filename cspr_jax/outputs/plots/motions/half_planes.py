@@ -1,4 +1,4 @@
-"""Plane sections of sets that half-spaces bound, cut to the window of a panel."""
+"""Plane sections of intersections of half-spaces, clipped to the window of a panel."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 
-# Owner of a side that belongs to the window.
+# Owner of sides that belong to the window.
 WINDOW = -1
 
 
 class Plane(NamedTuple):
-    """A plane of a section. Coordinates in it are products with its directions.
+    """Plane of a section. Coordinates in it are products with its two directions.
 
     Fields:
-        point: (3,) any point of it.
-        across: (3,) unit vector, to the right.
-        upward: (3,) unit vector, normal to it.
+        point: (3,) any point of the plane.
+        across: (3,) unit vector to the right.
+        upward: (3,) unit vector upward, normal to `across`.
     """
 
     point: np.ndarray
@@ -26,7 +26,7 @@ class Plane(NamedTuple):
     upward: np.ndarray
 
     def seen(self, points: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 2"]:
-        """Points in the coordinates of the plane, those beside it projected onto it."""
+        """Coordinates of points, projected onto the plane."""
         return points @ np.stack([self.across, self.upward], axis=1)
 
 
@@ -34,8 +34,8 @@ class Polygon(NamedTuple):
     """A convex polygon.
 
     Fields:
-        corners: (n, 2) counterclockwise; none of an empty one.
-        owners: (n,) of the side from each corner to the next one: number of a half-space, or `WINDOW`.
+        corners: (n, 2) corners, counterclockwise; none for an empty polygon.
+        owners: (n,) owner of the side from each corner to the next: index of a half-space, or `WINDOW`.
     """
 
     corners: np.ndarray
@@ -57,7 +57,7 @@ class Window(NamedTuple):
 def section(
     plane: Plane, normals: Float[np.ndarray, "n 3"], offsets: Float[np.ndarray, "n"], window: Window
 ) -> Polygon:
-    """The section of a set whose points keep `normals @ point >= offsets`."""
+    """The section of the set of points with `normals @ point >= offsets`."""
     (left, low), (right, high) = window
     corners = np.array([[left, low], [right, low], [right, high], [left, high]])
     polygon = Polygon(corners, np.full(4, WINDOW))
@@ -68,7 +68,7 @@ def section(
 
 
 def _cut(polygon: Polygon, normal: np.ndarray, offset: float, owner: int) -> Polygon:
-    # Return the part of a polygon where normal @ corner >= offset.
+    # Clip a polygon to normal @ point >= offset.
     slacks = polygon.corners @ normal - offset
     corners, owners = [], []
     for k, slack in enumerate(slacks):
@@ -84,7 +84,7 @@ def _cut(polygon: Polygon, normal: np.ndarray, offset: float, owner: int) -> Pol
 
 
 def window_around(points: Float[np.ndarray, "n 2"], *, margin: float = 0.12, shape: float = 1.0) -> Window:
-    """A window that holds some points."""
+    """A window that contains given points."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = (1.0 + 2.0 * margin) * max((high[0] - low[0]) / shape, high[1] - low[1])
     half = 0.5 * max(height, 1e-9) * np.array([shape, 1.0])

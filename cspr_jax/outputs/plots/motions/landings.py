@@ -8,7 +8,7 @@ from matplotlib.patches import Ellipse
 from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.store.reading.result import Result
 
-# More points than these hide each other.
+# Largest number of points that are drawn: more would hide each other.
 SHOWN = 3000
 MILLIMETRES = 1e3
 

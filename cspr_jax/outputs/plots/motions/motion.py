@@ -27,18 +27,18 @@ from cspr_jax.schema.quantities import PARTS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
-# Flags of the criteria that the chart of each quantity shows. Other criteria are shown in the chart of the path, or of
-# the tensions.
+# Flags of the criteria whose failures the chart of each quantity shows; the chart of the path, or of the tensions,
+# shows all others.
 SHOWN = {"tension": Verdict.WRENCH_INFEASIBLE | Verdict.UNCERTAINTY, "velocity": Verdict.OVER_FEED}
 for _limit in LIMITS:
     if _limit.chart:
         SHOWN[_limit.chart] = SHOWN.get(_limit.chart, Verdict.FEASIBLE) | _limit.flag
-# In longer plans the lines would hide the rest.
+# Largest number of segments whose boundaries are drawn: more lines would hide the rest.
 BOUNDARIES = 200
-# Points lie in a plane if they are nearer to it than this fraction of the distance between spools: typed numbers are
+# Points lie in a plane if they are closer to it than this fraction of the distance between spools: typed numbers are
 # rounded.
 ONE_PLANE = 1e-9
-# Limits beyond this many times the largest value are written and not drawn.
+# Limits beyond this multiple of the largest value are named in the legend, but not drawn.
 FAR = 3.0
 FAILS = "fails"
 FLIGHT = ("flight", "release", "landing")
@@ -52,7 +52,7 @@ def motion_figure(result: Result) -> Figure:
     # The spools and the path of a planar robot lie in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
     is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
-    # A file without P0 holds straight lines, of which the accelerations are worth seeing.
+    # A file without P0 contains straight lines, whose accelerations are shown.
     z0 = result.attributes.get("z0")
     more = [
         name
@@ -114,7 +114,7 @@ def _name_ends(figure: Figure, panel: Axes, rows: np.ndarray) -> None:
 
 
 def point_words(columns: Mapping[str, Any]) -> str:
-    """Words for the point of a platform whose positions are shown, where it is not the mass centre."""
+    """Words for the point of a platform whose positions are shown, unless it is the mass centre."""
     return ", positions of the origin of the platform's axes" if "mass_centre" in columns else ""
 
 
@@ -124,7 +124,7 @@ SHORT = {"smallest allowed": "at least", "largest allowed": "at most"}
 def draw_limits(
     panel: Axes, limits: list[tuple[str, float]], values: np.ndarray, unit: str, *, signed: bool = False
 ) -> None:
-    """Limits over time as lines, named in the legend; one far above all values is only named."""
+    """Draw limits over time as lines with names in the legend; limits far above all values are only named."""
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     beyond = []
     for words, value in limits:
@@ -145,7 +145,7 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     draw_limits(drawn["tension"], limits_of(robot_file, plan_file), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:
-        # The rule that chooses the tensions of redundant cables.
+        # Name the rule that chooses the tensions of redundant cables.
         drawn["tension"].set_ylabel(f"tension (N)\n{plan_file.tension_rule}")
     for _, level in limits_of(robot_file, plan_file, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
@@ -155,7 +155,7 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
 
 
 def boundaries(panel: Axes, result: Result) -> None:
-    """Lines between the segments of a motion; files of earlier versions do not say where these are."""
+    """Draw lines where segments of a motion meet, which files of earlier versions do not tell."""
     for time in result.data.get("segment_end", np.empty(0))[:-1][:BOUNDARIES]:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
 
@@ -171,14 +171,14 @@ def shade_failing(panel: Axes, columns: Mapping[str, Any], chart: str, charts: S
     """Shade the intervals of time in which a motion fails, where they are known."""
     intervals = failing_in(columns, chart, charts)
     if len(intervals):
-        # The areas reach from the bottom to the top of any panel; their edges show intervals without a length.
+        # Areas extend over the full height of a panel; their edges show intervals of length zero.
         areas = [[(start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0)] for start, end in intervals]
         style: dict[str, Any] = {"transform": panel.get_xaxis_transform(), "zorder": 0.5, "label": FAILS}
         panel.add_collection(PolyCollection(areas, **style, **FAILING), autolim=False)
 
 
 def doubt(result: Result) -> str:
-    """A line that says which segments of a motion are not proved feasible."""
+    """A line of text that says which segments of a motion are not proved feasible."""
     if result.attributes.get("feasible", 1):
         return ""
     none = result.data.get("segment_arcs", np.empty(0)) == 0
@@ -223,7 +223,7 @@ def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], 
 
 
 def _bounds(panel: Axes, time: np.ndarray, values: np.ndarray) -> None:
-    # Feasible between the bounds; those far beyond the motion leave the picture.
+    # Shade the feasible range between the bounds; do not extend the picture for bounds far beyond the motion.
     largest = np.abs(values[:, 1]).max()
     low, high = (np.clip(np.nan_to_num(values[:, k], nan=0.0), -10.0 * largest, 10.0 * largest) for k in (0, 2))
     panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.3, linewidth=0.0, label="feasible")
@@ -247,7 +247,7 @@ def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, names: list[st
 
 
 def failing_in(columns: Mapping[str, Any], chart: str, charts: Sequence[str]) -> Float[np.ndarray, "m 2"]:
-    """Intervals in which criteria fail that one of several charts shows."""
+    """Intervals in which criteria fail whose failures belong to one of several charts."""
     if "criterion_failing" not in columns:
         return np.reshape(columns.get("failing", ()), (-1, 2))
     shown = SHOWN.get(chart, Verdict.FEASIBLE)

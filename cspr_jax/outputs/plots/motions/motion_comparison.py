@@ -15,7 +15,7 @@ from cspr_jax.store.reading.result import Result
 
 
 def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
-    """Paths from the side and from above; over time the smallest tension and the largest speed of a cable."""
+    """Paths from the side and from above; smallest tension and largest cable speed over time."""
     if len(results) > len(COLOURS):
         raise InputError("results", len(results), f"at most {len(COLOURS)} in one picture")
     axes = [str(result.attributes.get("z_axis", "down")) for result in results]
@@ -50,7 +50,7 @@ def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
 
 
 def _draw_spools(panel: Axes, results: list[Result], j: int) -> None:
-    # Spools are those of the first robot only where all have them.
+    # Draw spools only if they are the same for all motions.
     bases = [np.asarray(result.attributes.get("base_points", np.empty((0, 3)))) for result in results]
     if all(base.shape == bases[0].shape and (base == bases[0]).all() for base in bases):
         panel.plot(bases[0][:, 0], bases[0][:, j], linestyle="", marker="s", markersize=4, color="0.35")
@@ -60,8 +60,8 @@ def _draw_spools(panel: Axes, results: list[Result], j: int) -> None:
 
 
 def _names(results: list[Result], files: list[str]) -> list[str]:
-    # A motion is named by its family where that tells the motions apart, else by its file; the duration follows, and
-    # whether it is not proved.
+    # Name each motion by its family if all families differ, else by its file; add the duration, and whether it is not
+    # proved.
     families = [str(result.attributes.get("family", "")) for result in results]
     stems = [Path(file).stem for file in files]
     labels = stems if len(set(stems)) == len(stems) else files

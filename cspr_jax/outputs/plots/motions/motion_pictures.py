@@ -31,9 +31,9 @@ class MotionPicture(NamedTuple):
     """A picture of a motion.
 
     Fields:
-        draw: makes it from the motion, the name of its file, and the time.
+        draw: function of the motion, the name of its file, and the time, which draws the picture.
         needed_quantity: quantity that the file must have; empty for none.
-        at_time: whether it shows one time, "t".
+        at_time: whether the picture shows a single time, "t".
     """
 
     draw: Callable[[Result, str, dict[str, float]], Figure]

@@ -1,4 +1,4 @@
-"""Robot and plan of a motion, from its file or from one beside it, for pictures that need more than its rows."""
+"""Robot and plan of a motion, from its file or another one, for pictures that need more than its rows."""
 
 import dataclasses
 import json
@@ -19,7 +19,7 @@ from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store.reading.result import Result
 
-# Lengths of cables in a table and of the robot in its poses differ by rounding alone, over the longest one.
+# Largest difference between cable lengths in a table and those of the robot in the same poses, over the longest one.
 SAME_LENGTH = 1e-6
 
 
@@ -31,7 +31,7 @@ def keeps_plan(result: Result) -> bool:
 def completed(
     result: Result, file: str, *, plan: Path | None, robot: dict[str, Any] | None, z_axis: str | None
 ) -> Result:
-    """A motion in CSV, which keeps neither robot nor axes, with what is given of these beside it."""
+    """A motion in CSV, which contains neither robot nor axes, completed by a given plan or robot."""
     if plan is not None:
         return with_plan(result, file, plan)
     if robot is not None:
@@ -45,7 +45,7 @@ def completed(
 
 
 def with_plan(result: Result, file: str, path: Path) -> Result:
-    """A motion without robot and plan, with those of a plan file."""
+    """A motion without robot and plan, completed by those of a plan file."""
     _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
     plan_file = read_plan(text, path)
@@ -57,12 +57,12 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
 
 
 def with_robot(result: Result, file: str, spec: dict[str, Any]) -> Result:
-    """A motion without robot and plan, with a robot, as a plan that takes the motion from its file."""
+    """A motion without robot and plan, completed by a robot and a plan that takes the motion from its file."""
     robot = spec["robot"]
     _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
     plan = checked_plan(spec, "--robot")
     robot_file = resolve_robot(plan.robot, "--robot", Path())
-    # The cables of a platform that only translates are those of its pairs.
+    # For a platform that only translates, motion files have the cables of the equivalent point mass.
     robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
     return _with_robot_file(result, file, robot_file, "--robot", {"plan": json_text(spec)})
 
@@ -87,7 +87,7 @@ def _with_robot_file(
 
 
 def _check_cables(result: Result, file: str, robot_file: RobotFile, path: object) -> None:
-    # The lengths must be those of this robot in these poses; for cables over pulleys only their number is known.
+    # Check that cable lengths are those of this robot in these poses; for cables over pulleys check their number alone.
     count = result.data["tension"].shape[1]
     if len(robot_file.base_points) != count:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""Acceleration along straight lines over the path, between its bounds, Boralugoda figure 4.1."""
+"""Acceleration along straight lines over the path, with its feasible range, Boralugoda figure 4.1."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, PANELS, chosen, robot_n
 from cspr_jax.outputs.plots.style.layout import columns_of, panels
 from cspr_jax.store.reading.result import Result
 
-# Bounds beyond so many times the largest acceleration of the motion leave the picture.
+# Bounds beyond this multiple of the largest acceleration of the motion are outside of the picture.
 BEYOND = 2.5
 
 
@@ -25,11 +25,11 @@ class PathSamples(NamedTuple):
     """A line of a plan.
 
     Fields:
-        number: of the segment, from 1 on.
-        length: of the line, m.
+        number: number of the segment, from 1 on.
+        length: length of the line, m.
         duration: s.
         s: (n,) fraction of the path at each row.
-        rates: (n, 3) s'': the least feasible value, that of the motion, and the largest feasible value, 1/s^2.
+        rates: (n, 3) s'': smallest feasible value, value of the motion, and largest feasible value, 1/s^2.
     """
 
     number: int
@@ -86,14 +86,14 @@ def _paths(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> list[P
 
 
 def _poses(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> np.ndarray:
-    # Return (n, 3) as in the file; a rest pose without a position is P0.
+    # Positions (n, 3) of the poses as in the file; a rest pose without a position is P0.
     frame, depth = frame_of(robot_file.base_points, robot_file.z_axis), result.attributes.get("z0", np.nan)
     rest = frame.outward(np.array([0.0, 0.0, depth]))
     return np.array([rest if pose.position is None else pose.position for pose in plan_file.pose])
 
 
 def _first_row(time: np.ndarray, start: float) -> int:
-    # The first of two rows at a boundary belongs to the segment before it.
+    # Where segments meet there are two rows: the first one belongs to the segment before.
     rows = np.searchsorted(time, start + np.array([-1e-12, 1e-12]) * max(abs(start), 1.0), "left")
     return int(rows[0] + (rows[1] - rows[0]) // 2)
 

@@ -1,4 +1,4 @@
-"""Phase plane of paths: path speeds over the path, from which the end can be reached, and what binds the motion."""
+"""Phase plane of paths: path speed over the path, speeds from which the end can be reached, and binding limits."""
 
 from typing import Any
 
@@ -12,10 +12,10 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, STYLES, robot_name
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 from cspr_jax.store.reading.result import Result
 
-# Height of the picture, over the largest speed of the motion; what lies higher leaves it.
+# Upper end of the picture, over the largest speed of the motion.
 HIGHEST = 1.25
 FREE: dict[str, Any] = {"color": "black"}
-# Limits that have a colour each.
+# Largest number of limits that have a colour each.
 MAX_NAMED = 12
 
 
@@ -58,14 +58,14 @@ def _top(low: np.ndarray, high: np.ndarray, speed: np.ndarray) -> float:
     fastest = float(np.nanmax(speed, initial=0.0))
     if fastest:
         return HIGHEST * fastest
-    # Without a motion all speeds from which the end can be reached, unless a few are far larger.
+    # Without a motion, show all speeds from which the end can be reached, unless a few are far larger.
     finite = high[np.isfinite(high) & (high > 0.0)]
     usual = 3.0 * float(np.median(finite)) if len(finite) else 1.0
     return HIGHEST * max(float(np.nanmax(low, initial=0.0)), min(usual, float(finite.max(initial=0.0)))) or 1.0
 
 
 def _names(data) -> list[tuple[int, int]]:
-    # Limits that bind, those of most nodes first.
+    # Binding limits, in the order of their numbers of nodes.
     pairs, counts = np.unique(
         np.stack([data["path_binds"].astype(int), data["path_binding_cable"].astype(int)]), axis=1, return_counts=True
     )
@@ -79,7 +79,7 @@ def _draw_motion(panel: Axes, data, rows: slice) -> None:
     flags, cables = data["path_binds"][rows], data["path_binding_cable"][rows]
     for k, (flag, cable) in enumerate([(0, 0), *_names(data)]):
         binds = ((flags == flag) & (cables == cable))[:-1]
-        # A cell is drawn from its first node to its second one.
+        # Draw a cell from its first node to its second one.
         at_nodes = np.append(binds, False) | np.insert(binds, 0, False)
         if not (at_nodes & np.isfinite(speed)).any():
             continue
@@ -90,14 +90,14 @@ def _draw_motion(panel: Axes, data, rows: slice) -> None:
 
 
 def _draw_passes(panel: Axes, data) -> None:
-    # Poses that the motion runs through.
+    # Mark poses that the motion passes without stopping.
     inside = (np.diff(data["path_segment"]) != 0) & (np.diff(data["path_section"]) == 0)
     for k, coordinate in enumerate(data["path_coordinate"][1:][inside].tolist()):
         panel.axvline(coordinate, color="0.35", linestyle=":", linewidth=1.2, label="_" if k else "pose")
 
 
 def _draw_failures(panel: Axes, s: np.ndarray, low: np.ndarray, first: list[int]) -> None:
-    # Up to the last point that no speed passes.
+    # Draw up to the last point that cannot be passed at any speed.
     is_named = False
     for rows in map(slice, first[:-1], first[1:]):
         unknown, coordinates = np.isnan(low[rows]), s[rows]

@@ -22,13 +22,14 @@ from cspr_jax.outputs.plots.style.word_ticks import reasons
 from cspr_jax.schema.verdicts import NO_REASON
 from cspr_jax.store.reading.result import Result
 
-# Lines of the table, which shows the first segments of a longer plan.
+# Largest number of segments in the table, which shows the first ones of a longer plan.
 SEGMENTS = 8
-# Inches: height of a line of the table, on a page and in a column; width of the robot, and its heights.
+# Inches: height of a line of the table, on a page and in a column; width of the robot, and its smallest and largest
+# height.
 LINE, NARROW_LINE = 0.28, 0.44
 ACROSS, LOW, HIGH = 6.6, 3.0, 6.4
 HEADS = ("segment", "arcs", "duration (s)", "margin (N)", "verdict")
-# Fractions of the width, and letters of a line of the verdict: of a page, and of a column.
+# Widths of the table's columns as fractions, and number of letters of a line of the verdict, on a page and in a column.
 WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)
 
 
@@ -55,7 +56,7 @@ def summary_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile) -
 
 
 def _draw_table(panel: Axes, cells: list[list[str]]) -> None:
-    # Letters of a table keep their size; matplotlib would make them as small as the narrowest column needs.
+    # Fix the size of letters, which matplotlib would shrink until the narrowest column fits.
     panel.axis("off")
     heads = [head.replace(" (", "\n(") if is_narrow() else head for head in HEADS]
     widths, letters = NARROW if is_narrow() else WIDE
@@ -82,7 +83,7 @@ def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None
     boundaries(panel, result)
     shade_failing(panel, result.data, "rate", ("tension", "rate"))
     panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
-    # The names of the cables stand above the tensions.
+    # Leave out names of cables, which are above the tensions.
     entries = zip(*panel.get_legend_handles_labels(), strict=True)
     others = {words: handle for handle, words in entries if words not in (*names, FAILS)}
     if others:
@@ -97,14 +98,14 @@ def _cells(result: Result) -> list[list[str]]:
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
         margin = f"{margins[k]:.4g}" if np.isfinite(margins[k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
-        # Lines, Bezier segments and splines have no arcs; a swing that is not feasible has no feasible number.
+        # Lines, Bezier segments and splines have no arcs; for a swing that is not feasible no number of arcs was found.
         arcs_text = f"{arcs}" if arcs else "none" if data["segment_tried_arcs"][k] else "-"
         cells.append([number, arcs_text, f"{duration:.4g}", margin, _verdict(data["segment_verdict"][k])])
     return cells
 
 
 def _verdict(verdict: np.ndarray) -> str:
-    # The first of the reasons, and how many there are besides.
+    # Write the first reason, and the number of others.
     numbers, words, _ = reasons(verdict[None], "feasible")
     others = (int(verdict) & ~NO_REASON.value).bit_count() - 1
     return words[int(numbers[0])] + (f", {others} more" if others > 0 else "")

@@ -1,4 +1,4 @@
-"""Tensions of a motion over time: the band that they fill, and the limits."""
+"""Tensions of a motion over time: the range of all cables, and the limits."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from cspr_jax.store.reading.result import Result
 
 
 def tensions_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Figure:
-    """The band of tensions over time, with the limits."""
+    """Range of the tensions over time, with the limits."""
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     panel = figure.subplots()
     draw_tensions(panel, result, limits_of(robot_file, plan_file))
@@ -39,7 +39,7 @@ def extremes(result: Result) -> str:
 def draw_tensions(
     panel: Axes, result: Result, limits: list[tuple[str, float]], charts: Sequence[str] = ("tension",)
 ) -> None:
-    """Tensions as a band from the smallest to the largest of all cables, each cable as a thin line, and the limits."""
+    """Draw the range from the smallest to the largest tension, each cable as a thin line, and the limits."""
     time, tension = result.axes["t"], result.data["tension"]
     low, high = np.min(tension, axis=1), np.max(tension, axis=1)
     panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.35, linewidth=0.0, label="range")
@@ -51,7 +51,7 @@ def draw_tensions(
     drawn = [value for _, value in limits if value <= FAR * float(np.abs(finite).max(initial=0.0))]
     top = 1.08 * max([float(finite.max(initial=0.0)), *drawn]) or 1.0
     bottom = min(0.0, 1.05 * float(finite.min(initial=0.0)))
-    # No cable pulls there.
+    # Tensions of zero, below which no cable can go.
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
     shade_failing(panel, result.data, "tension", charts)

@@ -25,11 +25,11 @@ from cspr_jax.outputs.plots.style.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.style.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.reading.result import Result
 
-# The robot is drawn where segments begin and end, at most so often.
+# Largest number of times at which the robot is drawn, among those where segments begin and end.
 SHOWN = 6
-# Inches: width of the robot, height of the texts above and below it, and heights of the picture.
+# Inches: width of the robot, height of texts above and below it, and smallest and largest height of the picture.
 ACROSS, BESIDE, LOW, HIGH = 6.6, 1.9, 3.9, 7.6
-# Spools nearer to each other than this fraction of the largest distance have one label.
+# Spools closer together than this fraction of the largest distance share a label.
 TOGETHER = 0.08
 
 
@@ -48,7 +48,7 @@ def trajectory_figure(result: Result, robot_file: RobotFile, plan_file: PlanFile
 
 
 def points_in_space(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> Float[np.ndarray, "n 3"]:
-    """Path, spools and corners of obstacles, which decide the shape of a picture."""
+    """Points that determine the shape of a picture: path, spools and corners of obstacles."""
     return np.concatenate(
         [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, plan_file.bodies)]
     )
@@ -71,7 +71,7 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
     if len(flight):
         panel.plot(*flight.T, color=COLOURS[2], linewidth=1.4, linestyle="--", zorder=3.0)
     spools = panel.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", zorder=2.0)[0]
-    # A flat box is larger than its panel, which is a square.
+    # A flat box extends beyond its panel, which is a square.
     spools.set(clip_on=False, in_layout=False)
     name_spools(panel, robot.base)
     for row, paths, corners in zip(rows, robot.cable_points, robot.corners, strict=True):
@@ -86,19 +86,19 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
 
 
 def add_tension_bar(figure: Figure, panel: Any, colours: ScalarMappable) -> None:
-    """The bar of the cables' colours, below the robot, which needs the width."""
+    """Add the bar of the cables' colours below the robot, which needs the full width."""
     figure.colorbar(colours, ax=panel, label="tension (N)", location="bottom", shrink=0.5, aspect=36, pad=0.02)
 
 
 def name_spools(panel: Any, base: Float[np.ndarray, "n_cables 3"]) -> None:
-    """Numbers of cables beside their spools; those of spools that stand together are one label."""
+    """Write numbers of cables beside their spools; spools close together share a label."""
     near = TOGETHER * np.ptp(base, axis=0).max()
     left = list(range(len(base)))
     while left:
         group = [k for k in left if np.linalg.norm(base[k] - base[left[0]]) <= near]
         left = [k for k in left if k not in group]
         words = ", ".join(str(k + 1) for k in group)
-        # The words stand above the marks.
+        # Place the words above the marks.
         above = panel.transData + ScaledTranslation(0.0, 0.06, panel.figure.dpi_scale_trans)
         position, style = (
             base[group].mean(0),

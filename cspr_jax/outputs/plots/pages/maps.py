@@ -23,9 +23,9 @@ from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
 from cspr_jax.store.reading.result import Result
 
-# Quantities whose extremes are instructive.
+# Quantities whose extreme cells the page lists.
 EXTREME = ("margin", "duration", "arcs", "oscillations")
-# Quantities that come first, and letters of all that a page may hold; the script of the charts has some five millions.
+# Quantities that come first, and largest number of letters of a page's data; the charts' script has some five million.
 FIRST = ("verdict", "duration", "margin")
 LARGEST = 14_000_000
 SHADES = 32
@@ -33,11 +33,11 @@ SPACE, WORKSPACE = ("x", "y", "z"), "workspace"
 
 
 def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
-    """Order of the axes in a page, the last one that of a row, and of their points."""
+    """Order of the axes in a page, of which the last runs along a row, and order of their points."""
     varying = [axis for axis, points in result.axes.items() if len(np.unique(points)) > 1]
     alone = [axis for axis in result.axes if axis not in varying]
     order = in_order(result, varying)
-    # The plane of a map over one axis is a line.
+    # A map over one axis is shown as a line.
     plane = order[:2] if len(order) > 1 else [*order, *alone][:2]
     names = [*(axis for axis in [*alone, *order] if axis not in plane), *reversed(plane)]
     return names, [np.unique(result.axes[axis], return_index=True)[1] for axis in names]
@@ -96,7 +96,7 @@ def _is_asked(result: Result, name: str) -> bool:
 
 
 def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
-    # Return the spools of a workspace's robot, seen along the axis out of the plane.
+    # Spools of a workspace's robot, seen along the axis out of the plane.
     if result.attributes["map"] != WORKSPACE or "verdict" not in result.data or not set(plane) <= set(SPACE):
         return None
     base = np.asarray(robot_of(result).base_points, float)
@@ -105,7 +105,7 @@ def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
 
 
 def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
-    # Return outlines of obstacles, seen along the axis out of the plane, and their section at each point of that axis.
+    # Outlines of obstacles, seen along the axis out of the plane, and their sections at each point of that axis.
     plane = names[-2:]
     bodies = obstacles(result) if set(plane) <= set(SPACE) else []
     if not bodies:
@@ -126,7 +126,7 @@ def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> di
 
 
 def _closed(corners: np.ndarray) -> dict[str, list[float]]:
-    # Return the closed line in metres to a tenth of a millimetre, upward and across.
+    # Closed line in metres to a tenth of a millimetre, upward coordinates first.
     rounded = np.round(np.concatenate([corners, corners[:1]]), 4)
     return {"up": rounded[:, 0].tolist(), "across": rounded[:, 1].tolist()}
 
@@ -162,7 +162,7 @@ def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
 
 
 def _scale(scale: Scale) -> dict[str, Any]:
-    # Return colours for a browser: steps where matplotlib has steps, of which the first may stand for "none".
+    # Colours for a browser, in steps where matplotlib has steps, of which the first may stand for "none".
     if not isinstance(scale.norm, BoundaryNorm):
         shades = [_hex(scale, part) for part in np.linspace(0.0, 1.0, SHADES).tolist()]
         ends = float(scale.norm.vmin or 0.0), float(scale.norm.vmax or 0.0)
@@ -185,13 +185,13 @@ def _scale(scale: Scale) -> dict[str, Any]:
 
 
 def _hex(scale: Scale, position: float) -> str:
-    # A whole number is the number of a colour, a fraction a position on the scale; beyond the last one is the rest.
+    # An integer is the index of a colour, a fraction a position on the scale; values beyond have the last colour.
     red, green, blue, alpha = scale.colours(position)
     return to_hex((red, green, blue, alpha))
 
 
 def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
-    # Return each combination of flags that occurs, with its sentences and the colour of the first reason.
+    # Each combination of flags that occurs, with its sentences and the colour of the first reason.
     flags, index = np.unique(conjunction(verdicts.astype(np.int64)), return_inverse=True)
     entries = []
     for code in flags.tolist():
@@ -212,10 +212,10 @@ def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
 def informative_cells(
     data: dict[str, np.ndarray], verdict: Int[np.ndarray, "..."], count: int
 ) -> list[tuple[int, ...]]:
-    """Cells to look at, all of them feasible.
+    """Feasible cells that a page suggests.
 
-    First come the extremes of margins, durations and counts, and for each count the cell with the smallest margin;
-    then, one after the other, the cell that is farthest from the chosen ones, in steps of the grid over its size.
+    First come extremes of margins, durations and counts, and for each count the cell with the smallest margin; then,
+    one after the other, the cell farthest from those already chosen, with distances relative to the grid's extent.
     """
     feasible = np.argwhere(verdict == 0)
     if not len(feasible) or count < 1:

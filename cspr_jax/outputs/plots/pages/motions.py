@@ -20,13 +20,13 @@ from cspr_jax.robots.model.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 
-# Rows of a motion in a page, at most.
+# Largest number of rows of a motion in a page.
 MAX_ROWS = 1200
-# Nodes of paths in a page, at most.
+# Largest number of nodes of paths in a page.
 MAX_NODES = 50_000
-# Intervals of failure that the page names; it shades all of them.
+# Largest number of intervals of failure that the page names; it shades all of them.
 MAX_INTERVALS = 12
-# Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
+# Columns of cables, with the quantities of their limits; units of all quantities that limits bound.
 CHARTS = ("path", "tension", "rate", "length")
 OF_CABLES = {"tension": "tension", "rate": "speed", "length": "length"}
 UNITS = {row.quantity: WRITTEN.get(row.unit, row.unit).replace("^2", "²") for row in LIMITS}
@@ -58,7 +58,7 @@ def motion_content(
         "t": packed(np.asarray(columns["t"])[rows]),
         "path": packed(robot.position),
         "attached": packed(robot.attached),
-        # Points on pulleys, between where cables enter and where they are attached.
+        # Points of cables on pulleys, between entry and attachment points.
         "arcs": packed(robot.cable_points[:, :, 1:-1]),
         "onArc": robot.cable_points.shape[2] - 2,
         "corners": packed(robot.corners),
@@ -113,7 +113,7 @@ def _bounds(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
 
 
 def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
-    # Path speeds, and for each node the words of the limit that binds behind it.
+    # Path speeds, and for each node words for the limit that binds after it.
     if "path_speed" not in columns or len(columns["path_speed"]) > MAX_NODES:
         return None
     minimum, largest, actual, allowed = np.asarray(columns["path_speed"]).T
@@ -132,7 +132,7 @@ def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
 
 
 def _surface(body: Obstacle) -> dict[str, Any]:
-    # Corners and triangles, as a browser draws them.
+    # Corners and triangles of a body, as a browser draws them.
     triangles = hull_of(points_of(body))[0]
     corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     lines = [np.round(line, 9).tolist() for line in lines_on(body)]
@@ -159,7 +159,7 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
 
 
 def _chosen(time: np.ndarray) -> np.ndarray:
-    # Choose rows evenly in time, as many as there are or a page takes; where segments meet rows are twice.
+    # Choose rows evenly in time, as many as there are or as a page can hold; rows where segments meet are repeated.
     count = min(len(time), MAX_ROWS)
     times = np.linspace(time[0], time[-1], count)
     return np.unique(np.clip(np.searchsorted(time, times - 1e-12), 0, len(time) - 1))

@@ -1,4 +1,4 @@
-"""A page in one file: its content with arrays packed, the library of its charts, and the scripts that join them."""
+"""A page in one file: its content with packed arrays, the library of charts, and the page's own scripts."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from cspr_jax import __version__
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.shapes import Num
 
-# Names of the typed arrays of browsers, by NumPy's names.
+# Typed arrays of browsers, by NumPy's dtypes.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
-# The page's own parts, in the order in which a browser reads them.
+# The page's own scripts, in the order in which a browser reads them.
 SCRIPTS = ("page.js", "map.js", "motion.js", "solid.js", "start.js")
 STYLE, FRAME = "page.css", "page.html"
 PLACEHOLDER = re.compile(r"<!-- (\w+) -->")
 
 
 def page_of(title: str, content: dict[str, Any]) -> str:
-    """A page."""
+    """HTML text of a page."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
         raise InputError("plotly", "absent", 'installed: pip install "cspr_jax[report]"') from error
-    # Without "<" no text can end the script element, nor open a comment in it that hides its end.
+    # Without "<" no text can end the script element, or open a comment that hides its end.
     data = json.dumps(content, allow_nan=False, separators=(",", ":"), sort_keys=True).replace("<", "\\u003c")
     parts = {
         "title": html.escape(title),
@@ -49,7 +49,7 @@ def _part(name: str) -> str:
 
 
 def packed(values: Num[np.ndarray, "..."]) -> dict[str, Any]:
-    """Values for a page."""
+    """Values compressed for a page."""
     values = np.asarray(values)
     if values.dtype.kind == "f":
         name = "float32"
@@ -57,6 +57,6 @@ def packed(values: Num[np.ndarray, "..."]) -> dict[str, Any]:
     else:
         low, high = int(values.min(initial=0)), int(values.max(initial=0))
         name = "int32" if low < 0 or high > 65535 else "uint8" if high < 256 else "uint16"
-    # The time of writing is left out, so that the same values are the same text.
+    # Leave out the time of writing, so that equal values give equal texts.
     data = gzip.compress(np.ascontiguousarray(values, np.dtype(name).newbyteorder("<")).tobytes(), 6, mtime=0)
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}

@@ -12,12 +12,12 @@ from cspr_jax.outputs.plots.robots.obstacles import faces_of, obstacles
 from cspr_jax.outputs.plots.robots.robot_at import posed
 from cspr_jax.store.reading.result import Result
 
-# A page holds so many boundaries at most: one for each point of the other axes, or else that of their first points.
+# Largest number of boundaries, one for each point of the other axes; with more points, a page shows the first alone.
 LARGEST_COUNT = 16
 
 
 def solids_content(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
-    """The boundaries of a workspace, for the points of the axes that are not of space."""
+    """The boundaries of a workspace, for the points of all axes other than x, y and z."""
     if not is_solid(result):
         return None
     others = [k for k, name in enumerate(names) if name not in SPACE and len(points[k]) > 1]

@@ -1,4 +1,4 @@
-"""Obstacles of maps of workspaces and of motions in pictures: sections, shadows, and surfaces in space."""
+"""Obstacles of maps of workspaces and of motions in pictures: sections, projections, and surfaces in space."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cspr_jax.store.reading.result import Result
 CIRCLE_POINTS = 48
 COLOUR = "#5c3d2e"
 AREA: dict[str, Any] = {"facecolor": (*to_rgb(COLOUR), 0.35), "edgecolor": COLOUR, "linewidth": 0.8}
-# Numbers of azimuths and of elevations of the points on a ball.
+# Numbers of azimuths and of elevations of points on a sphere.
 AROUND, UPWARD = 64, 33
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
@@ -37,7 +37,7 @@ def obstacles(result: Result) -> list[np.ndarray]:
 
 
 def points_of(shape: Obstacle) -> Float[np.ndarray, "n 3"]:
-    """Points whose hull an obstacle is."""
+    """Points whose convex hull is the obstacle."""
     if isinstance(shape, Box):
         return shape.centre + (CORNERS * shape.half) @ shape.rotation.T
     around, upward = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.5, 0.5, UPWARD) * np.pi
@@ -48,7 +48,7 @@ def points_of(shape: Obstacle) -> Float[np.ndarray, "n 3"]:
 
 
 def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int]) -> None:
-    """Draw the shadows of obstacles beside a path, and widen the axes for them."""
+    """Draw projections of obstacles beside a path, and widen the axes for them."""
     for number, body in enumerate(bodies):
         shadow = outline(points_of(body)[:, across])
         if len(shadow):
@@ -80,7 +80,7 @@ def section_of(points: Float[np.ndarray, "n 3"], across: list[str], coordinate: 
 
 
 def draw_obstacles(panel: Axes, result: Result, across: list[str], coordinates: dict[str, float]) -> dict[str, Artist]:
-    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed where they are hidden."""
+    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed outlines elsewhere."""
     if not set(across) < set("xyz"):
         return {}
     limits, entries = (panel.get_xlim(), panel.get_ylim()), dict[str, Artist]()
@@ -105,7 +105,7 @@ def faces_of(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3 3"]:
 
 
 def draw_bodies(panel: Any, bodies: Sequence[Obstacle], *, is_down: bool) -> None:
-    """Draw obstacles behind cables and path, which stay visible."""
+    """Draw obstacles behind cables and path, so that these stay visible."""
     view = across_and_up(is_down=is_down)
     for body in bodies:
         points = points_of(body)
@@ -117,7 +117,7 @@ def draw_bodies(panel: Any, bodies: Sequence[Obstacle], *, is_down: bool) -> Non
 
 
 def lines_on(body: Obstacle) -> list[np.ndarray]:
-    """Lines that show the shape of an obstacle: edges of a box, circles about the ends of a cylinder, or on a ball."""
+    """Lines that show the shape of an obstacle: edges of a box, or circles on a cylinder or sphere."""
     if isinstance(body, Box):
         return list(hull_of(points_of(body))[1])
     if isinstance(body, Cylinder):
@@ -126,7 +126,7 @@ def lines_on(body: Obstacle) -> list[np.ndarray]:
 
 
 def _circle(centre: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
-    # The right singular vectors behind the first one are at right angles to the normal.
+    # The right singular vectors after the first one are normal to the axis.
     _, first, second = np.linalg.svd(normal[None])[2]
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS + 1)[:, None]
     return centre + radius * (np.cos(angle) * first + np.sin(angle) * second)

@@ -1,4 +1,4 @@
-"""The robot of a motion at its rows: where its cables are attached, and the edges of its platform."""
+"""The robot at the rows of its motion: attachment points of its cables, and edges of its platform."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Moving(NamedTuple):
     """A robot in motion, in the axes of its file.
 
     Fields:
-        base: (n_cables, 3) where the cables leave, m.
-        position: (n, 3) of the effector at each row, m.
-        attached: (n, n_cables, 3) where the cables are attached, m.
-        cable_points: (n, n_cables, m, 3) points that the cables are drawn through, from `base` to `attached`, m.
-        corners: (n, 2 n_edges, 3) ends of the platform's edges, one after the other, m; none of a point mass.
+        base: (n_cables, 3) points at which the cables leave, m.
+        position: (n, 3) position of the effector at each row, m.
+        attached: (n, n_cables, 3) attachment points of the cables, m.
+        cable_points: (n, n_cables, m, 3) points through which the cables are drawn, from `base` to `attached`, m.
+        corners: (n, 2 n_edges, 3) ends of the platform's edges, one after the other, m; none for a point mass.
     """
 
     base: np.ndarray
@@ -47,19 +47,19 @@ def moving(
         return Moving(np.empty((0, 3)), position, nothing, np.empty((len(rows), 0, 2, 3)), nothing)
     base = np.asarray(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
-    # A motion holds poses of the mass centre from the reference orientation, unless it says that they are of the axes.
+    # Poses of a motion are of the mass centre and relative to the reference orientation, unless they are of the axes.
     centre = np.zeros(3) if "mass_centre" in columns else np.asarray(robot_file.centre_of_mass or [0.0] * 3, float)
     body = body - centre
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
         edges, quaternion = _edges(robot_file, plan_file, body, centre), np.asarray(quaternion)[rows]
-        # With more cables the reference orientation is that of the file's axes, and jax need not be loaded.
+        # With more cables the reference orientation is given by the file's axes, and jax need not be loaded.
         if "mass_centre" not in columns and len(base) <= 6:
             from cspr_jax.outputs.platform_poses import of_own_axes
 
             quaternion = of_own_axes(robot_file, quaternion)
         rotations = np.array([rotation_matrix(one) for one in quaternion])
-    # These points turn with the platform, at each row.
+    # Rotate points with the platform, at each row.
     attached, corners = (
         position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
     )
@@ -67,7 +67,7 @@ def moving(
 
 
 def _edges(robot_file: RobotFile, plan_file: PlanFile | None, attached: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    # Edges (n, 2, 3) of the platform, from the point whose positions the motion holds.
+    # Edges (n, 2, 3) of the platform, relative to the point whose positions the motion has.
     points = robot_file.platform_points or ()
     shape = None if plan_file is None else plan_file.body(centre.tolist(), points)
     if isinstance(shape, Hull):

@@ -16,7 +16,7 @@ from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
 from cspr_jax.store.reading.result import Result
 
-ON_ARC = 9  # points that an arc is drawn through, its ends included
+ON_ARC = 9  # number of points through which an arc is drawn, including its ends
 TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}
 
 
@@ -24,11 +24,11 @@ class Posed(NamedTuple):
     """A robot at a pose, in the axes of its file.
 
     Fields:
-        base: (n_cables, 3) where the cables leave, m.
-        attached: (n_cables, 3) where they are attached, for a point mass its position, m.
-        cable_points: (n_cables, m, 3) points that they are drawn through, m.
-        faces: (m, 3, 3) triangles of the hull of these points, m; empty where they lie on a line.
-        edges: (k, 2, 3) edges of it, m.
+        base: (n_cables, 3) points at which the cables leave, m.
+        attached: (n_cables, 3) attachment points, for a point mass its position, m.
+        cable_points: (n_cables, m, 3) points through which the cables are drawn, m.
+        faces: (m, 3, 3) triangles of the hull of the attachment points, m; empty where these lie on a line.
+        edges: (k, 2, 3) edges of the hull, m.
     """
 
     base: np.ndarray
@@ -91,7 +91,7 @@ def hull_of(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "m 3 3"
 def cable_points(
     robot_file: RobotFile, attached: Float[np.ndarray, "... n_cables 3"]
 ) -> Num[np.ndarray, "... n_cables m 3"]:
-    """Points that cables are drawn through."""
+    """Points through which cables are drawn."""
     entry = np.asarray(robot_file.base_points, float)
     if robot_file.pulley_radius is None:
         return np.stack([np.broadcast_to(entry, attached.shape), attached], axis=-2)
@@ -104,7 +104,7 @@ def cable_points(
     aside = ray - high[..., None] * axis
     wide = np.linalg.norm(aside, axis=-1)
     side = aside / np.where(wide > 0.0, wide, 1.0)[..., None]
-    # Angles about the centre of the pulley, from where the cable enters: of the attachment, and of where it leaves.
+    # Angles about the centre of the pulley, from the entry point on, of the attachment point and of the exit point.
     across = wide - radius
     with np.errstate(invalid="ignore"):
         free = np.sqrt(across**2 + high**2 - radius**2)

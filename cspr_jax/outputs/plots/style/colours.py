@@ -1,4 +1,4 @@
-"""Colours of the cells of a map: a scale that a few extreme cells do not use up."""
+"""Colours of the cells of a map, with a scale that a few extreme cells do not stretch."""
 
 import dataclasses
 from typing import Any
@@ -15,12 +15,12 @@ from matplotlib.ticker import MaxNLocator
 from cspr_jax.outputs.plots.style.layout import is_narrow
 
 NONE_COLOUR = "#d0d0d0"
-BULK_FRACTION = 0.98  # of the cells that the scale covers, if a scale of all cells would be too long
-LARGEST_RATIO = 1.5  # of the lengths of both scales, above which it is too long
-FEW = 10  # cells that are all covered; of more, at least one may lie beyond
-# Up to so many counts always have a colour each.
+BULK_FRACTION = 0.98  # fraction of the cells that the scale covers, where a scale of all cells would be too long
+LARGEST_RATIO = 1.5  # a scale of all cells is too long above this ratio of its length to that of the covered cells
+FEW = 10  # up to this number of cells the scale covers all; with more, at least one may lie beyond
+# Up to this number of different counts each has a colour.
 TOLD_APART = 12
-# Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
+# Computing colours of larger values would overflow; no quantity of a robot is as large.
 LARGEST = 1e100
 
 
@@ -30,10 +30,10 @@ class Scale:
 
     Fields:
         colours: the colour map.
-        norm: its bounds.
-        extend: ends at which values lie beyond: "neither", "min", "max" or "both".
-        beyond: words for the values that lie beyond; empty for none.
-        ticks: of the bar, with their texts; None: chosen automatically.
+        norm: bounds of the scale.
+        extend: ends beyond which there are values: "neither", "min", "max" or "both".
+        beyond: words for the values beyond the ends; empty for none.
+        ticks: ticks of the bar, with their texts; None: chosen automatically.
         is_integer: whether all values are whole numbers.
         missing: whether there are cells without a value.
     """
@@ -51,7 +51,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     """The scale of the values that a picture shows."""
     if data.dtype.kind in "iu":
         return _of_counts(data)
-    data = data.astype(float)  # the largest number is beyond those of single precision
+    data = data.astype(float)  # single precision could not hold LARGEST
     inside = data[np.abs(data) < LARGEST]
     low, high = (float(inside.min()), float(inside.max())) if inside.size else (0.0, 1.0)
     minimum, maximum = low, high
@@ -69,7 +69,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if maximum <= minimum:
         maximum = minimum + (abs(minimum) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
-    # An infinite value has no number to show.
+    # Infinite values have no number to show.
     ends = data[np.isfinite(data)]
     words = [f"up to {float(ends.max()):.3g}"] if (ends > maximum).any() else []
     words += [f"down to {float(ends.min()):.3g}"] if (ends < minimum).any() else []
@@ -85,7 +85,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
 
 
 def _bulk(values: np.ndarray) -> float:
-    # Return a value that occurs, not one between two values.
+    # A quantile that is one of the values, not an interpolated one.
     part = 1.0 if values.size <= FEW else min(BULK_FRACTION, 1.0 - 1.5 / values.size)
     return float(np.quantile(values, part, method="inverted_cdf"))
 
@@ -113,7 +113,7 @@ def _of_counts(data: np.ndarray) -> Scale:
 
 
 def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> dict[str, Artist]:
-    """Explain colours of panels: by a bar, below them in a narrow picture, or for words by entries of its legend."""
+    """Explain colours: by a bar beside the panels, or below them in a narrow picture; words by entries of a legend."""
     ticks, texts = scale.ticks or ([], [])
     if is_narrow() and texts and not any(text.lstrip("-").isdigit() for text in texts):
         return {text: Patch(color=image.cmap(image.norm(tick))) for tick, text in zip(ticks, texts, strict=True)}

@@ -1,4 +1,4 @@
-"""Text that fits into a picture: long names cut, long lines broken."""
+"""Fitting of text into a picture: long names are cut, long lines broken."""
 
 import itertools
 import re
@@ -16,13 +16,13 @@ from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNL
 from cspr_jax.errors import printable
 
 LONGEST_NAME = 40
-# Letters that a title of one line has at least.
+# Smallest number of letters of a title of one line.
 SHORTEST = 8
 # A hyphen before a number, and not within a word.
 HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
-# Beginning of the line of a title that names segments without a proof.
+# Beginning of the line of a title that names segments that are not proved feasible.
 DOUBT = "NOT PROVED FEASIBLE"
-# Fraction of a panel's slot that its tick labels leave free.
+# Largest fraction of a panel's slot that tick labels may fill.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
 # Largest numbers of intervals between ticks, tried one after the other.
@@ -30,7 +30,7 @@ FEWER_TICKS = (5, 4, 3, 2, 1)
 
 
 def shortened(text: str, maximum: int = LONGEST_NAME) -> str:
-    """A text from a file, on one line and not too long."""
+    """A text from a file, joined to one line and cut to a length."""
     text = printable(text)
     if len(text) <= maximum:
         return text
@@ -39,9 +39,9 @@ def shortened(text: str, maximum: int = LONGEST_NAME) -> str:
 
 
 def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> None:
-    """Break titles and labels that are longer than their space, at commas or else at spaces; legends likewise.
+    """Break titles, labels and legends that are longer than their space, at commas or else at spaces.
 
-    Numbers get a real minus sign.
+    Hyphens before numbers become minus signs.
     """
     width, height = figure.bbox.width, figure.bbox.height
     _fit_title(figure, 0.97 * width, has_title=has_title, lines=lines)
@@ -66,7 +66,7 @@ def with_minus(text: str) -> str:
 
 
 def share_of_panels(figure: Figure) -> float:
-    """The part of a picture's height that its panels take."""
+    """Fraction of a picture's height that its panels take."""
     spans = sorted(
         (panel.get_position(original=panel.name == "3d").intervaly for panel in figure.axes if _is_panel(panel)),
         key=lambda span: float(span[0]),
@@ -83,7 +83,7 @@ def _is_panel(panel: Axes) -> bool:
 
 
 def thin_ticks(figure: Figure) -> None:
-    """Give horizontal axes of numbers fewer ticks where these would meet."""
+    """Give horizontal axes fewer ticks where their numbers would overlap."""
     panels = [panel for panel in figure.axes if panel.get_visible() and panel.name == "rectilinear"]
     panels = [panel for panel in panels if isinstance(panel.xaxis.get_major_locator(), MaxNLocator)]
     for count in FEWER_TICKS:
@@ -95,7 +95,7 @@ def thin_ticks(figure: Figure) -> None:
         drawn = {panel: _ticks(panel) for panel in panels}
         panels = [panel for panel, ticks in drawn.items() if _labels_meet(ticks)]
         for panel in panels:
-            # Two numbers show a scale: at last the outer ones stay.
+            # Two numbers are enough to show a scale: keep the outer ones if nothing else fits.
             ends = FixedLocator([drawn[panel][0].get_loc(), drawn[panel][-1].get_loc()])
             panel.xaxis.set_major_locator(MaxNLocator(count) if count > 1 else ends)
 
@@ -132,7 +132,7 @@ def _fit_title(figure: Figure, space: float, *, has_title: bool, lines: int | No
 
 
 def _fit_above(panel: Axes, space: float) -> None:
-    # A legend above its panel has as many entries side by side as fit.
+    # A legend above its panel gets as many entries per line as fit.
     legend = panel.get_legend()
     if legend is None or legend.get_gid() != ABOVE:
         return
@@ -178,7 +178,7 @@ def _minus_of(words: Callable[..., str]) -> Callable[..., str]:
 
 
 def _fit_legend(figure: Figure, legend: Legend, space: float) -> None:
-    # A legend below the panels has as many entries side by side as fit, then entries on several lines.
+    # A legend below the panels gets as many entries per line as fit, then entries of several lines.
     handles = [handle for handle in legend.legend_handles if handle is not None]
     words = [text.get_text() for text in legend.get_texts()]
     where: Literal["lower center", "outside lower center"]
@@ -194,12 +194,12 @@ def _fit_legend(figure: Figure, legend: Legend, space: float) -> None:
 
 
 def _fewer_columns(count: int) -> list[int]:
-    # Numbers of columns in which so many entries fill lines of nearly the same length, the largest first.
+    # Numbers of columns with which all lines have nearly equally many entries, the largest first.
     return list(dict.fromkeys(-(-count // lines) for lines in range(2, count + 1)))
 
 
 def _fractions(panel: Axes) -> tuple[float, float]:
-    # Return a panel's fractions of the picture's width and height; a colour bar beside several panels has no slot in
+    # Fractions of the picture's width and height that a panel takes; a colour bar beside several panels has no slot in
     # their grid.
     spec = panel.get_subplotspec()
     if spec is None:
@@ -227,7 +227,7 @@ def _break(text: Text, space: float, *, upright: bool = False) -> None:
 
 
 def _packed(parts: list[str], joint: str, fits) -> list[str]:
-    # Put as many parts on each line as fit; the joint stays at the end of a line that goes on.
+    # Put as many parts on each line as fit; a separator stays at the end of its line.
     lines = [parts[0]]
     for part in parts[1:]:
         if fits(lines[-1] + joint + part):

@@ -1,4 +1,4 @@
-"""Constants of a picture of a map: the start of the motions, and the axes that it does not show."""
+"""Constants of a picture of a map: the start of the motions, and coordinates on axes that are not shown."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def table(settings: object, key: str) -> dict:
 
 
 def start(result: Result) -> dict[str, float]:
-    """Start of all segments of a map, if it is one position."""
+    """Start of all segments of a map, if it is the same position for all."""
     coordinates = table(table(result.settings, "trajectory"), "from").get("position") or ()
     moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
     return {} if moving else dict(zip("xyz", coordinates, strict=False))
@@ -46,7 +46,7 @@ def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[
 
 
 def _best(result: Result, axis: str) -> str:
-    # Such as "best z0 of 5 (1.2 to 2.4 m)".
+    # Words such as "best z0 of 5 (1.2 to 2.4 m)".
     points = np.unique(result.choices[axis].points)
     name, _, low = values(result, axis, points[:1])[0].partition(" = ")
     high = values(result, axis, points[-1:])[0].partition(" = ")[2]

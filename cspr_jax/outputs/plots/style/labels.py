@@ -11,7 +11,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.store.reading.result import Result
 
-# Axes whose names in files are no words.
+# Words for axes whose names in files are not words.
 WORDS = {
     "tilt_azimuth": "azimuth of the tilt",
     "circle_radius": "radius of the circle",
@@ -24,7 +24,7 @@ WORDS = {
 }
 LONGEST_LABEL = 80
 PANELS = 6
-# Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
+# Colours of Okabe and Ito, which colour-blind readers can distinguish; dashes help in greyscale.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Units as pictures show them.
 WRITTEN = {
@@ -47,7 +47,7 @@ def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
 
 
 def robot_name(result: Result) -> str:
-    """The robot, as a title names it."""
+    """The name of the robot in a title."""
     return shortened(result.attributes["robot"])
 
 
@@ -57,12 +57,12 @@ def heading(result: Result, name: str) -> str:
 
 
 def label(result: Result, name: str) -> str:
-    """A quantity for an axis or a colour bar."""
+    """The label of a quantity on an axis or a colour bar."""
     return shortened(result.labels[name], LONGEST_LABEL) + _in_brackets(result, name)
 
 
 def axis_label(result: Result, axis: str) -> str:
-    """A coordinate for an axis."""
+    """The label of an axis."""
     return WORDS.get(axis, shortened(axis)) + _in_brackets(result, axis)
 
 
@@ -72,7 +72,7 @@ def _in_brackets(result: Result, name: str) -> str:
 
 
 def unit(result: Result, name: str) -> str:
-    """The unit that a picture shows."""
+    """The unit of a quantity in pictures."""
     units = result.units[name]
     symbol = "°" if is_angle(result, name) else WRITTEN.get(units, shortened(units))
     return "" if symbol == "1" else symbol
@@ -94,12 +94,12 @@ def principal_angle(degrees: float) -> float:
 
 
 def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
-    """A coordinate with its value."""
+    """The name and value of a coordinate, in words."""
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
     symbol = unit(result, axis)
     if is_angle(result, axis):
         drawn = principal_angle(drawn)
-    # A range that passes zero may miss it by rounding.
+    # A point of a range across zero may differ from zero by rounding.
     drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
     name = WORDS.get(axis, shortened(axis))
     if axis == "cable":
@@ -108,7 +108,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
 
 
 def values(result: Result, axis: str, points: Float[np.ndarray, "n"]) -> list[str]:
-    """Coordinates with their values, in as few digits as tell them apart, but at least three."""
+    """Names and values of coordinates, with the fewest digits, at least three, that tell them apart."""
     texts: list[str] = []
     for digits in range(3, 17):
         texts = [value(result, axis, point, digits=digits) for point in points]
@@ -118,5 +118,5 @@ def values(result: Result, axis: str, points: Float[np.ndarray, "n"]) -> list[st
 
 
 def chosen(count: int, maximum: int) -> np.ndarray:
-    """Evenly chosen points of many."""
+    """Indices of evenly chosen points, at most a given number."""
     return np.unique(np.linspace(0, count - 1, min(maximum, count)).round().astype(int))

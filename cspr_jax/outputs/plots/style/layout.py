@@ -1,4 +1,4 @@
-"""Panels of a picture: how many, where, how large, and their axes in degrees."""
+"""Panels of a picture: their number, positions and sizes, and their ticks."""
 
 import math
 
@@ -15,17 +15,17 @@ from cspr_jax.outputs.plots.style.labels import principal_angle
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
 # Smallest width of a panel, inches, with its labels and colour bar.
 MIN_WIDTH = 1.6
-# Below this width, cm, a picture is that of a column: its title has one line, its bars lie below the panels.
+# Narrower pictures, cm, are for a column of a page: the title has one line, and colour bars lie below the panels.
 NARROW, INCH = 12.0, 2.54
 
 
 def is_narrow() -> bool:
-    """Tell whether the picture that is made inside `style.in_style` is that of a column."""
+    """Tell whether the picture that is made inside `style.in_style` is for a column of a page."""
     return bool(matplotlib.rcParams["figure.figsize"][0] * INCH < NARROW)
 
 
 def columns_of(count: int) -> int:
-    """Number of panels side by side in a picture of the width that `in_style` has set."""
+    """Number of panels that fit side by side into the width that `style.in_style` has set."""
     possible = max(1, int(matplotlib.rcParams["figure.figsize"][0] / MIN_WIDTH))
     return min(possible, 2 if count == 4 else min(3, count))
 
@@ -33,7 +33,7 @@ def columns_of(count: int) -> int:
 def panels(
     figure: Figure, count: int, *, polar: bool = False, same: bool = True
 ) -> tuple[list[Axes], list[Axes], list[Axes]]:
-    """Panels with common axes, or common horizontal ones."""
+    """Panels that share both axes, or only the horizontal one."""
     columns = columns_of(count)
     lines = -(-count // columns)
     kind = {"projection": "polar"} if polar else {}
@@ -49,20 +49,20 @@ def panels(
 
 
 def in_degrees(axis: Axis, span: float) -> None:
-    """Ticks of an angle, without whole revolutions."""
+    """Set ticks of an angle in degrees, without full revolutions."""
     step = next((step for step in DEGREES if span <= 7.0 * step), None)
     axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
     axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{principal_angle(tick) + 0.0:.6g}"))
 
 
 def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
-    """Ticks at whole numbers only."""
+    """Set ticks at integers only."""
     axis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
 def set_polar_ticks(axes: list[Axes], radius: float, unit: str) -> None:
-    """Ticks around and outward."""
+    """Set ticks of azimuth and radius."""
     step = next((step for step in DEGREES if radius <= 4.5 * step), None)
     even = step is None or unit != "°"
     all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, radius)) if even else np.arange(0.0, radius, step)

@@ -1,4 +1,4 @@
-"""Options of the command line for pictures; no matplotlib here, for `cspr --help` is to answer at once."""
+"""Options of the command line for pictures; without matplotlib, so that `cspr --help` is fast."""
 
 import argparse
 import re
@@ -9,18 +9,18 @@ from pathlib import Path
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
 PHASE_PLANE = "phase_plane"
 TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
-# Widths of pictures for papers, cm: usual ones, and those of publishers.
+# Widths of pictures for papers, cm: common ones, and those of publishers.
 USUAL = "usual"
 WIDTHS = {
     "column": {USUAL: 8.89, "ieee": 8.89, "elsevier": 9.0},
     "page": {USUAL: 17.5, "ieee": 18.1, "elsevier": 19.0},
 }
 _WIDTH = re.compile(r"[\d.]+[a-z]*", re.ASCII)
-_SHORTEST = 5  # letters of an option that is shortened
+_SHORTEST = 5  # smallest number of letters of an abbreviated option
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the command that draws results."""
+    """Add the arguments of the command that draws results."""
     parser.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside the result)"
@@ -56,7 +56,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 
 
 def add_best(parser: argparse.ArgumentParser) -> None:
-    """The argument for the best point of an axis of a map."""
+    """Add the argument for the best point of an axis of a map."""
     parser.add_argument(
         "--best",
         action="append",
@@ -68,7 +68,7 @@ def add_best(parser: argparse.ArgumentParser) -> None:
 
 
 def add_motion_plan(parser: argparse.ArgumentParser) -> None:
-    """The argument of commands that read motions in CSV."""
+    """Add the argument for the plan of a motion in CSV."""
     parser.add_argument(
         "--plan", type=Path, metavar="FILE", help="plan file of a motion in CSV, which keeps neither robot nor limits"
     )
@@ -77,7 +77,7 @@ def add_motion_plan(parser: argparse.ArgumentParser) -> None:
 
 
 def add_style(parser: argparse.ArgumentParser) -> None:
-    """Arguments of every picture; `style.style_of` reads them."""
+    """Add the arguments of every picture, which `style.style_of` reads."""
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="size of the picture, cm, such as 16x10")
     presets = parser.add_mutually_exclusive_group()
     for name, widths in WIDTHS.items():
@@ -97,7 +97,7 @@ def add_style(parser: argparse.ArgumentParser) -> None:
 
 
 def with_widths(words: Sequence[str]) -> list[str]:
-    """Words of a command line in which each option of a width has one, since the name of a file may follow it."""
+    """Add the default where an option of a width has no value, since the name of a file may follow the option."""
     joined, rest = list[str](), list(words)
     while rest and rest[0] != "--":
         word = rest.pop(0)

@@ -16,11 +16,11 @@ from mpl_toolkits.mplot3d import proj3d
 
 from cspr_jax.numerics.shapes import Float
 
-ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
-# Margin around the drawn points, over their size.
+ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, direction to the viewer
+# Margin around the drawn points, over their extent.
 MARGIN = 0.04
-MAX_TICKS, MIN_TICKS = 5, 2  # of an axis
-STEPS = 4  # in which a picture is made to fill its slot
+MAX_TICKS, MIN_TICKS = 5, 2  # numbers of ticks of an axis
+STEPS = 4  # number of steps in which a picture is enlarged to fill its slot
 FILLS = "fills its slot"
 
 
@@ -30,7 +30,7 @@ def colours_of_tension() -> ListedColormap:
 
 
 def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) -> None:
-    """Axes of true proportions, seen from the side with z upward in the picture; `fill_panels` makes them large."""
+    """Set axes of true proportions, seen from the side with the vertical upward; `fill_panels` enlarges them later."""
     low, high = points.min(0), points.max(0)
     extents = np.maximum(high - low, 0.1 * (high - low).max())
     middle = 0.5 * (low + high)
@@ -39,7 +39,7 @@ def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) ->
         half = (0.5 + MARGIN) * signs[k] * extents[k]
         panel.set(**{f"{name}lim": (middle[k] - half, middle[k] + half), f"{name}label": f"{name} (m)"})
         axis = getattr(panel, f"{name}axis")
-        # A label that is turned by matplotlib may stand on its head.
+        # Labels that matplotlib rotates may be upside down.
         axis.set_rotate_label(False)
         axis.label.set_rotation(90.0 if name == "z" else 0.0)
         axis.labelpad = rcParams["font.size"] * (0.4 if name == "z" else 1.8)
@@ -47,13 +47,13 @@ def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) ->
     panel.set_box_aspect(tuple(extents))
     panel.set_proj_type("ortho")
     panel.view_init(elev=ELEVATION, azim=AZIMUTH)
-    # The square of the panel is larger than its slot, and lies over its neighbours.
+    # The background of the panel is larger than its slot, and would hide its neighbours.
     panel.patch.set_visible(False)
     panel.set_gid(FILLS)
 
 
 def across_and_up(*, is_down: bool) -> Float[np.ndarray, "2 3"]:
-    """Directions to the right and upward in the picture of a robot in space."""
+    """Directions in space that point to the right and upward in the picture."""
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
@@ -61,14 +61,14 @@ def across_and_up(*, is_down: bool) -> Float[np.ndarray, "2 3"]:
 
 
 def towards_eye(*, is_down: bool) -> Float[np.ndarray, "3"]:
-    """Direction towards the eye."""
+    """Direction towards the viewer."""
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
     level = np.cos(elevation)
     return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]) * signs_of(is_down=is_down)
 
 
 def signs_of(*, is_down: bool) -> Float[np.ndarray, "3"]:
-    """Directions in which the axes of a picture in space grow."""
+    """Signs of the directions in which the axes of a picture in space increase."""
     return np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
 
 
@@ -100,7 +100,7 @@ def fill_panels(figure: Figure) -> None:
         _add_ticks(figure, panel)
         _leave_out(panel)
         if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < MIN_TICKS:
-            # An axis needs two numbers to show its scale: begin with many, and leave out those that overlap.
+            # An axis needs two numbers to show its scale: begin with many ticks, and remove those that overlap.
             for axis in _axes(panel):
                 axis.set_major_locator(MaxNLocator(MAX_TICKS, prune="both"))
             _fill(figure, panel, slot)
@@ -108,7 +108,7 @@ def fill_panels(figure: Figure) -> None:
 
 
 def _add_ticks(figure: Figure, panel: Any) -> None:
-    # Axes that have space for more ticks than the others get them.
+    # Axes with space for more ticks get more.
     for axis in _axes(panel):
         usual = axis.get_major_locator()
         for count in range(2 * MAX_TICKS, MIN_TICKS, -2):
@@ -125,7 +125,7 @@ def _add_ticks(figure: Figure, panel: Any) -> None:
 
 
 def _fill(figure: Figure, panel: Any, slot: Bbox) -> None:
-    # It takes a few steps, since letters do not grow with the box.
+    # Take a few steps, since letters do not grow with the box.
     width, height = figure.get_size_inches()
     side = max(slot.width * width, slot.height * height)
     space = TransformedBbox(slot, figure.transSubfigure)
@@ -143,7 +143,7 @@ def _fill(figure: Figure, panel: Any, slot: Bbox) -> None:
 
 
 def _place_words(figure: Figure, panel: Any) -> None:
-    # Ticks and labels of a panel in space move only when it is drawn: draw it without all else.
+    # Ticks and labels of a panel in space are placed only when it is drawn: draw it without anything else.
     others = [*figure.get_children(), *panel.collections, *panel.lines, *panel.texts]
     others = [artist for artist in others if artist is not panel and not artist.get_animated()]
     for artist in others:
@@ -174,7 +174,7 @@ def words_in_space(panel: Any) -> list[Bbox]:
 
 
 def _leave_out(panel: Any) -> None:
-    # Even among few ticks, leave out those whose numbers would meet others: an axis may be seen nearly from its end.
+    # Leave out ticks whose numbers overlap others, even if few are left: an axis may be seen nearly from its end.
     boxes = [axis.label.get_window_extent() for axis in _axes(panel)]
     for axis in _axes(panel):
         locations = []

@@ -19,8 +19,8 @@ from cspr_jax.outputs.plots.style.layout import INCH, NARROW
 from cspr_jax.outputs.plots.style.options import USUAL, WIDTHS
 from cspr_jax.outputs.plots.style.scene import fill_panels
 
-# Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
-# text in SVG, and a dollar sign in a name is no mathematics. Sizes of letters are relative to font.size.
+# Settings on top of matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Text stays text: TrueType
+# in PDF, text in SVG, and dollar signs are no mathematics. Sizes of letters are relative to font.size.
 RC_PARAMS = {
     "text.parse_math": False,
     "axes.formatter.useoffset": False,
@@ -42,14 +42,14 @@ RC_PARAMS = {
 # No dates and versions in the files.
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
-# Letters of pictures for papers, points; their heights follow from their content.
+# Font sizes of pictures for papers, points; the heights of such pictures follow from their content.
 PRESETS = {"column": 8.0, "page": 9.0}
 UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
-MIN_FRACTION = 0.5  # of the height that panels take; where it is less, the picture gets higher
-HIGHER, TRIES = 1.2, 6  # by which factor, and how often at most
-# Where the size of the picture is given, letters of the default size get smaller instead, down to so many points.
+MIN_FRACTION = 0.5  # smallest fraction of the height that panels take; where they take less, the picture gets higher
+HIGHER, TRIES = 1.2, 6  # factor by which it gets higher, and largest number of times
+# In a picture of given size letters of the default size shrink instead, by a factor down to a number of points.
 SMALLER, MIN_LETTERS = 0.92, 5.0
-# A picture is held in memory as a whole, several bytes a pixel.
+# Pictures are held in memory at several bytes a pixel.
 LARGEST_PIXELS = 1e8
 
 
@@ -57,12 +57,12 @@ class Style(NamedTuple):
     """Choices of the user.
 
     Fields:
-        size: width and height, cm; None: what suits the picture.
-        dpi: pixels an inch, of PNG and of the coloured cells in PDF and SVG.
+        size: width and height, cm; None: chosen by the picture.
+        dpi: pixels per inch, in PNG and for coloured cells in PDF and SVG.
         font_size: points.
-        width: of a picture whose height follows, cm; None: what suits the picture.
-        has_title: whether titles are drawn; a line about a missing proof is drawn in any case.
-        is_free: whether letters may get smaller than `font_size`.
+        width: width of a picture whose height follows, cm; None: chosen by the picture.
+        has_title: whether titles are drawn; a line about a missing proof is always drawn.
+        is_free: whether letters may be smaller than `font_size`.
     """
 
     size: tuple[float, float] | None = None
@@ -81,7 +81,7 @@ def style_of(
     *,
     title: bool = True,
 ) -> Style:
-    """The style that options ask for."""
+    """The style that options specify."""
     name, _, of_width = (preset or "").partition(" ")
     if preset is not None and name not in PRESETS:
         raise ConfigError("preset", f"{shown(preset)}: {demand(one_of(preset, PRESETS))}, or absent")
@@ -129,7 +129,7 @@ def _bounded(key: str, value: float, bounds: tuple[float, float]) -> float:
 
 @contextmanager
 def in_style(style: Style) -> Iterator[None]:
-    """Make figures look alike, whatever the user's matplotlib is set to."""
+    """Draw figures in this style, independently of the user's settings of matplotlib."""
     params = RC_PARAMS | {"font.size": style.font_size}
     width = style.size[0] if style.size is not None else style.width
     if width is not None:
@@ -139,12 +139,12 @@ def in_style(style: Style) -> Iterator[None]:
 
 
 def laid_out(figure: Figure, style: Style) -> None:
-    """Give a picture its size, and its texts their lines."""
+    """Set the size of a picture and break its texts into lines."""
     width, height = (float(side) for side in figure.get_size_inches())
     if style.size is not None:
         width, height = style.size[0] / INCH, style.size[1] / INCH
     elif style.width is not None:
-        # Panels get narrower, letters do not get much smaller: heights are in the middle of the two.
+        # Panels get narrower but letters hardly smaller: scale heights by the geometric mean of both.
         part = style.width / INCH / width
         is_rigid = any(panel.get_aspect() != "auto" and panel.get_adjustable() == "box" for panel in figure.axes)
         is_rigid &= all(panel.name != "3d" for panel in figure.axes) or figure.get_layout_engine() is None
@@ -162,7 +162,7 @@ def laid_out(figure: Figure, style: Style) -> None:
 
 
 def _enlarge_panels(figure: Figure, style: Style) -> None:
-    # Panels take their fraction of the height in a narrow picture, or one of the default height.
+    # Only narrow pictures, or those whose width is given, can leave panels too little height.
     if figure.get_layout_engine() is None or (style.width is None and figure.get_figwidth() * INCH >= NARROW):
         return
     letters, before = style.font_size, -1.0
@@ -170,11 +170,11 @@ def _enlarge_panels(figure: Figure, style: Style) -> None:
         with warnings.catch_warnings(record=True) as caught:
             warnings.filterwarnings("always", "constrained_layout not applied")
             figure.draw_without_rendering()
-        # Panels without space stay where they were.
+        # Layout engines leave panels without space unchanged.
         fraction = 0.0 if caught else share_of_panels(figure)
         if fraction >= MIN_FRACTION:
             return
-        if style.size is None and 0.0 < fraction <= before:  # panels of a shape of their own
+        if style.size is None and 0.0 < fraction <= before:  # panels of fixed shape do not grow
             figure.set_figheight(figure.get_figheight() / HIGHER)
             return
         before = fraction
@@ -187,7 +187,7 @@ def _enlarge_panels(figure: Figure, style: Style) -> None:
             for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
                 for words in axis.get_ticklabels()[:1]:
                     axis.set_tick_params(labelsize=SMALLER * float(words.get_fontsize()))
-    # A picture without space for its panels is refused where it is written.
+    # Pictures without space for their panels are refused when they are written.
 
 
 def rendered(figure: Figure, ending: str, style: Style) -> bytes:
@@ -208,7 +208,7 @@ def rendered(figure: Figure, ending: str, style: Style) -> bytes:
 
 @contextmanager
 def _no_missing_letters() -> Iterator[None]:
-    # A letter that the font lacks is drawn as a box.
+    # Letters that the font lacks are drawn as boxes.
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
         yield

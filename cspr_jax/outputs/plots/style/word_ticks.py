@@ -1,4 +1,4 @@
-"""Quantities whose numbers stand for words, as colours and ticks with these words: verdicts, and bounds by name."""
+"""Colours and ticks of quantities whose values stand for words: verdicts, and names of binding limits."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.store.reading.result import Result
 
 OF_LIMITS = {limit.flag: (limit.legend, limit.colour) for limit in LIMITS}
-# Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
-# Ito's, and greys.
+# Words and colours of verdicts: more fundamental reasons come first, and failures before undecided verdicts. The
+# colours are Okabe and Ito's, and greys.
 REASONS = {
     Verdict.NOT_ACCESSIBLE: ("not accessible", "#f4f4f4"),
     Verdict.ABOVE_SPOOLS: ("above the spools", "#9e9e9e"),
@@ -34,12 +34,12 @@ REASONS = {
     Verdict.NOT_FINITE: ("not finite", "#000000"),
 }
 FEASIBLE_COLOUR = "#009E73"
-# Okabe and Ito's colours, too; if there are more words, the colours follow each other.
+# Colours of other words, also Okabe and Ito's; they repeat if there are more words.
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
 def worded(result: Result, name: str, values: Num[np.ndarray, "..."]) -> tuple[np.ndarray, list[str], list[str]] | None:
-    """Words that the values of a quantity stand for."""
+    """Values of a quantity as indices of words, these words, and their colours; None: the values are numbers."""
     quantity = quantity_of(result.attributes.get("map"), name)
     if quantity.unflagged:
         return reasons(values, quantity.unflagged)
@@ -48,7 +48,7 @@ def worded(result: Result, name: str, values: Num[np.ndarray, "..."]) -> tuple[n
 
 
 def _named(values: np.ndarray, words: tuple[str, ...]) -> tuple[np.ndarray, list[str], list[str]]:
-    # A word has the same colour in all pictures of a sweep, where there are colours for all. 0 stands for none.
+    # If there are enough colours, each word has the same colour in all pictures of a sweep. 0 stands for none.
     used = np.unique(values)
     few = len(words) - 1 <= len(MORE)
     ranks = used - 1 if few else np.arange(len(used)) - (0 in used)
@@ -65,7 +65,7 @@ def word_scale(words: list[str], colours: list[str]) -> Scale:
 
 
 def reasons(verdicts: Num[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
-    """Verdicts as numbers of reasons."""
+    """Verdicts as indices of reasons, the reasons in words, and their colours."""
     flags = verdicts.astype(int) & ~NO_REASON.value
     numbers = np.zeros(flags.shape, int)
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
