@@ -32,7 +32,7 @@ def binding(
     table, numbers = np.concatenate(slacks, axis=1)[: len(times)], np.array(names)
     nearest = np.where(np.isnan(table), np.inf, table).argmin(1)
     flags, cables = numbers[nearest].T
-    # Where none of these criteria fails, another criterion may, within its intervals of failure.
+    # If none of these criteria fails at a row, another one may, within its intervals of failure.
     is_broken = (np.take_along_axis(table, nearest[:, None], 1) < 0.0).any(1)
     for name, intervals in (details.get("failing_by_criterion") or {}).items():
         ends = np.reshape(intervals, (-1, 2))

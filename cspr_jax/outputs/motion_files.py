@@ -154,7 +154,7 @@ def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
 
 
 def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
-    # Whether the segment of each row is feasible; rows where two segments meet belong to both.
+    # Tell for each row whether its segment is feasible; rows where two segments meet belong to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
     good = plan.is_feasible

@@ -1,1 +1,1 @@
-"""Processes: XLA's settings, compiled code, workers, stages of the work, and how they are shown."""
+"""Processes: XLA's settings, compiled code, worker processes, stages of the work and their display."""

@@ -1,10 +1,10 @@
-"""Compiled code that one run leaves to the next.
+"""Cache of compiled code from run to run.
 
-jax writes an entry directly under its name, and only once: a killed run would leave half an entry for ever. So each run
-has a folder of its own, with links to all complete entries (copies, where the disk has no links), and hands its new
-ones over when it ends. A kept entry ends with its name and a checksum: one that was damaged, or is a copy of another,
-is removed before jax sees it; one that cannot be used is replaced by what is compiled then.
-Entries are code that is executed: a folder in which others can place some is refused.
+jax writes an entry directly under its final name and never again, so that a killed run would leave half an entry for
+ever. Therefore each run has a folder of its own, with links to all complete entries (copies, where the disk has no
+links), and moves its new entries to the common folder when it ends. A kept entry ends with its name and a checksum: an
+entry that is damaged, or a copy of another, is removed before jax sees it; an entry that cannot be used is replaced by
+newly compiled code. Entries are code that is executed: a folder into which others can write is refused.
 """
 
 import atexit
@@ -27,27 +27,28 @@ from pathlib import Path
 
 from cspr_jax.runtime.packed import is_complete, is_too_large
 
-# Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
+# Number of entries kept, the newest ones. An entry is a kernel for one shape, of some 0.1 to 1 MB, or its program, a
+# tenth of that.
 LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
-# Frame that readers of zstd skip (RFC 8878, 3.1.2); those of zlib read no further than its end.
+# Frame that readers of zstd skip (RFC 8878, 3.1.2); readers of zlib stop at the end of their own data.
 _SKIPPED = b"\x50\x2a\x4d\x18"
-# Version of the form of entries; as a part of the folder's name, it gives each form a folder of its own.
+# Version of the format of entries; it is part of the folder's name, so that each format has a folder of its own.
 FORMAT = 2
-# With a largest size, jax notes beside each entry when it was used last.
+# If this sets a largest size, jax writes the time of last use beside each entry.
 MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
 _OWN, _SEPARATOR = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry for '(.*?)': ((\w+).*)", re.DOTALL)
-# Environment variable with the folder of the programs of `persistent_jit`: that of this run.
+# Environment variable with this run's folder for programs of `persistent_jit`.
 PROGRAMS = "CSPR_PROGRAMS"
-# Whatever the umask says, others write into none of our folders.
+# Mode of folders: others cannot write into them, whatever the umask.
 PRIVATE = 0o700
 
 
 @dataclasses.dataclass
 class _KeptEntries:
-    # Entries of former runs that this one has taken: each with its kept file, and the identity of the file of this run.
+    # Entries taken from former runs, each with its kept file and the identity of its file in the folder of this run.
     entries: Path
     folder: Path
     process: int
@@ -55,12 +56,12 @@ class _KeptEntries:
     unusable: set[str] = dataclasses.field(default_factory=set)
 
 
-# The run of this process, if it has one.
+# The entries of this process, if it has a folder.
 _pending: list[_KeptEntries] = []
 
 
 def opened(folder: Path, warn: Callable[[str], None]) -> Path:
-    """The folder of this run, with all entries so far; its new entries are handed over at the end of the process."""
+    """Open a folder for this run with all entries so far; its new entries are kept at the end of the process."""
     if largest_size() >= 0 and importlib.util.find_spec("filelock") is None:
         raise OSError(errno.ENOTSUP, f"jax needs filelock for {MAX_SIZE}: pip install filelock")
     full, run_folder = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
@@ -68,7 +69,7 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     full.mkdir(mode=PRIVATE, exist_ok=True)
     check_owner(full)
     _remove_leftovers(folder)
-    shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
+    shutil.rmtree(run_folder, ignore_errors=True)  # left by a process of the same number
     run_folder.mkdir(mode=PRIVATE)
     run = _KeptEntries(full, run_folder, os.getpid())
     damaged = _take(run)
@@ -96,7 +97,7 @@ def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
 
 
 def plain_bytes(path: Path, maximum: int = LARGEST_ENTRY) -> bytes:
-    """Content of a plain file; nothing that lies in its place, such as a pipe, holds up the reader."""
+    """Content of a regular file; anything else of that name, such as a pipe, is refused, not waited for."""
     flags = (getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     descriptor = os.open(path, os.O_RDONLY | sum(flags))
     with os.fdopen(descriptor, "rb") as file:
@@ -107,13 +108,13 @@ def plain_bytes(path: Path, maximum: int = LARGEST_ENTRY) -> bytes:
 
 
 def largest_size() -> int:
-    """Bytes that jax is told to keep at most."""
+    """Largest number of bytes that jax is set to keep."""
     loaded = sys.modules.get("jax")
     if loaded is not None:
         return int(loaded.config.jax_compilation_cache_max_size)
     try:
         return int(os.environ.get(MAX_SIZE, "-1"))
-    except ValueError:  # jax says so when it is imported
+    except ValueError:  # jax reports the error when it is imported
         return -1
 
 
@@ -124,7 +125,7 @@ def _take(run: _KeptEntries) -> int:
         name, _, checksum = entry.name.rpartition(_SEPARATOR)
         try:
             data = plain_bytes(entry)
-        except FileNotFoundError:  # another run has taken it away
+        except FileNotFoundError:  # another run has removed it
             continue
         except OSError:
             data, checksum = b"", "unreadable"
@@ -143,7 +144,7 @@ def _take(run: _KeptEntries) -> int:
 
 
 def _identity_of(path: Path) -> tuple[int, int]:
-    # It differs once another file has been put in its place.
+    # The identity of a file changes when another file replaces it.
     status = path.lstat()
     return status.st_ino, status.st_mtime_ns
 
@@ -171,7 +172,7 @@ def hand_over() -> None:
 
 
 def set_aside(beginning: str) -> int:
-    """Forget kept entries that cannot be used: what is compiled now takes their place."""
+    """Remove kept entries that cannot be used, so that newly compiled code replaces them."""
     count = 0
     for run in _pending:
         names = {name for name in run.origins if name.startswith(beginning)} - run.unusable
@@ -180,13 +181,13 @@ def set_aside(beginning: str) -> int:
         for name in names:
             target = run.folder / name
             with contextlib.suppress(OSError):
-                if _identity_of(target) == run.origins[name][1]:  # jax does not replace an entry either
+                if _identity_of(target) == run.origins[name][1]:  # jax never replaces an entry itself
                     target.unlink()
     return count
 
 
 def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
-    # jax warns of each entry that it cannot read or write: report the first one in our words, and drop the others.
+    # jax warns of each entry that it cannot read or write: report the first in our own words, and drop the others.
     usual, warned = warnings.showwarning, threading.Event()
 
     def show(message, category, filename, lineno, file=None, line=None):
@@ -209,7 +210,7 @@ def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
 
 
 def _is_of_system(kind: str) -> bool:
-    # Such an error says nothing of the entry.
+    # Such an error does not mean that the entry is unusable.
     error = getattr(builtins, kind, None)
     return isinstance(error, type) and issubclass(error, OSError | MemoryError)
 
@@ -225,7 +226,7 @@ def _hand_over(run: _KeptEntries) -> None:
         run.origins.pop(name)[0].unlink(missing_ok=True)
     names = {entry.name.rpartition(_SEPARATOR)[0] for entry in run.entries.iterdir()}
     for entry in run.folder.iterdir():
-        if entry.name.endswith(_USED) or entry.name.startswith("."):  # jax's times, and its lock
+        if entry.name.endswith(_USED) or entry.name.startswith("."):  # jax's files of times, and its lock
             continue
         with contextlib.suppress(OSError):
             before, identity = run.origins.get(entry.name, (None, None))
@@ -244,7 +245,7 @@ def _hand_over(run: _KeptEntries) -> None:
 
 
 def _trim(entries: Path) -> None:
-    # Other runs may do the same.
+    # Other runs may remove entries at the same time.
     sizes = {}
     for entry in entries.iterdir():
         with contextlib.suppress(FileNotFoundError):
@@ -258,7 +259,7 @@ def _trim(entries: Path) -> None:
 
 
 def _ending(name: str) -> bytes:
-    # A kept entry holds its name, so that a copy under another name is noticed.
+    # A kept entry contains its name, so that a copy under another name is detected.
     words = os.fsencode(f"{__name__}: {name}")
     return _SKIPPED + len(words).to_bytes(4, "little") + words
 
@@ -269,7 +270,7 @@ def checksum_of(name: str, data: bytes) -> str:
 
 
 def _remove_leftovers(folder: Path) -> None:
-    # Runs of this machine that were killed have left these folders behind.
+    # Remove folders that killed runs of this machine have left.
     for run_folder in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
         process = run_folder.name.rpartition("-")[2]
         if process.isdigit() and _is_gone(int(process)):
@@ -277,7 +278,7 @@ def _remove_leftovers(folder: Path) -> None:
 
 
 def _is_gone(process: int) -> bool:
-    if os.name != "posix":  # signal 0 asks nothing there
+    if os.name != "posix":  # there signal 0 is no mere query
         return False
     try:
         os.kill(process, 0)

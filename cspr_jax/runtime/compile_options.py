@@ -1,8 +1,8 @@
-"""Flags and options with which XLA compiles in less time, and makes slower code: for plans, which compute little."""
+"""Flags and options with which XLA compiles faster, but to slower code: for plans, which compute little."""
 
 import os
 
-# With these flags compiling takes half of the time.
+# With these flags compiling takes half the time.
 QUICK = (
     "--xla_backend_optimization_level=1",
     "--xla_cpu_use_fusion_emitters=false",
@@ -11,5 +11,5 @@ QUICK = (
 
 
 def proof_options() -> dict[str, int] | None:
-    """Options of jax.jit for kernels of proofs, which then take a third of that time: a motion has few blocks."""
+    """Options of jax.jit for kernels of proofs, which then compile in a third of the time; a motion has few blocks."""
     return {"xla_backend_optimization_level": 0} if QUICK[0] in os.environ.get("XLA_FLAGS", "") else None

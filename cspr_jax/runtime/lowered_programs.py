@@ -1,8 +1,8 @@
-"""Programs as jax lowers them (StableHLO, as bytes), and their call within a function that jax compiles.
+"""Programs as jax lowers them (StableHLO, as bytes), and calls of them within functions that jax compiles.
 
-`jax.export` does the same for programs that are to last for years and for other devices. These are read by the same
-jaxlib alone, which saves one more conversion, a package that `jax.export` needs, and SciPy's linear algebra, which it
-imports for calls of LAPACK: a program that calls anything but its own operations is not written.
+`jax.export` does the same for programs that must last for years and run on other devices. These programs are read only
+by the same jaxlib, which saves one more conversion, a package that `jax.export` needs, and SciPy's linear algebra,
+which it imports for calls of LAPACK. Programs that call foreign code are not written.
 """
 
 import functools
@@ -16,7 +16,7 @@ from jax.extend.mlir.dialects import func
 from jax.extend.mlir.passmanager import PassManager
 from jax.interpreters import mlir
 
-# Calls of other code may hold addresses of one process, or need what this process has not loaded.
+# Calls of foreign code may contain addresses of a process, or need libraries that this process has not loaded.
 _CALLS = b"custom_call"
 
 
@@ -24,8 +24,8 @@ class LoweredProgram(NamedTuple):
     """A function of arrays as a program.
 
     Fields:
-        name: of the function.
-        code: the program.
+        name: name of the function.
+        code: bytes of the program.
         results: shape and dtype of each result.
     """
 
@@ -36,13 +36,13 @@ class LoweredProgram(NamedTuple):
 
 def lowered(function: Callable, leaves: Sequence[Any]) -> LoweredProgram | None:
     """Trace and lower a function."""
-    # The module has all of the arguments, used or not.
+    # Keep unused arguments, so that calls can pass all of them.
     traced = jax.jit(function, keep_unused=True).trace(*leaves)
     results = traced.jaxpr.out_avals
     if traced.jaxpr.effects or any(result.weak_type for result in results):
         return None
     module = traced.lower().compiler_ir("stablehlo")
-    # Lines of Python would be a half of the compiled code, and of the time for reading it.
+    # Without this, line numbers of Python would be half of the compiled code, and of the time for reading it.
     PassManager.parse("builtin.module(strip-debuginfo)", module.context).run(module.operation)
     code = mlir.module_to_bytecode(module)
     written = tuple((tuple(result.shape), np.dtype(result.dtype).str) for result in results)
@@ -50,7 +50,7 @@ def lowered(function: Callable, leaves: Sequence[Any]) -> LoweredProgram | None:
 
 
 def call(program: LoweredProgram, *leaves: Any) -> list:
-    """Results of a program, inside of a function that jax compiles."""
+    """Call a program inside of a function that jax compiles."""
     return _primitive().bind(*leaves, program=program)
 
 

@@ -1,15 +1,15 @@
-"""Bytes that zlib or zstd has compressed: whether they are complete, and how much they hold."""
+"""Bytes that zlib or zstd has compressed: checks of completeness and of size before they are unpacked."""
 
 import sys
 import zlib
 
-LARGEST_CODE = 1 << 28  # bytes, not compressed
-_DENSEST = 1032  # largest ratio of compression by zlib, that of zeros
+LARGEST_CODE = 1 << 28  # bytes before compression
+_DENSEST = 1032  # largest ratio of compression by zlib, which zeros attain
 _STEP, _ZSTD = 1 << 20, b"\x28\xb5\x2f\xfd"
 
 
 def inflated(data: bytes, maximum: int) -> bytes:
-    """Content of bytes that zlib has compressed; they must be complete, and hold no more than `maximum`."""
+    """Unpack bytes that zlib has compressed; they must be complete, and contain at most `maximum` bytes."""
     reader = zlib.decompressobj()
     try:
         content = reader.decompress(data, maximum)
@@ -21,7 +21,7 @@ def inflated(data: bytes, maximum: int) -> bytes:
 
 
 def is_complete(data: bytes) -> bool:
-    """Tell whether compressed code is complete: a full disk, or the end of the process, may have left half of it."""
+    """Tell whether compressed code is complete; a full disk, or the end of a process, may have left a part of it."""
     if data[:1] == b"x":  # zlib's
         return _is_complete_zlib(data)
     for module in ("compression.zstd", "zstandard"):
@@ -44,7 +44,7 @@ def _is_complete_zlib(data: bytes) -> bool:
 
 
 def _is_complete_zstd(zstd, data: bytes) -> bool:
-    # Two libraries of nearly the same interface; jax takes the one that there is.
+    # Two libraries with nearly the same interface; jax uses the one that is installed.
     reader = zstd.ZstdDecompressor()
     try:
         if hasattr(reader, "decompressobj"):
@@ -56,14 +56,14 @@ def _is_complete_zstd(zstd, data: bytes) -> bool:
 
 
 def is_too_large(data: bytes) -> bool:
-    """Tell whether compressed code holds more than it may: jax would inflate it at one go."""
+    """Tell whether compressed code contains too many bytes, since jax would unpack all at once."""
     if data.startswith(_ZSTD):
         return _zstd_length(data) > LARGEST_CODE
     return len(data) > LARGEST_CODE // _DENSEST and not is_complete(data)
 
 
 def _zstd_length(data: bytes) -> int:
-    # The head of a frame may say how long its content is (RFC 8878, 3.1.1.1); 0 where it does not.
+    # The header of a frame may give the length of its content (RFC 8878, 3.1.1.1); 0 where it does not.
     head = data[len(_ZSTD)] if len(data) > len(_ZSTD) else 0
     is_single, width = head >> 5 & 1, (head >> 5 & 1, 2, 4, 8)[head >> 6]
     start = len(_ZSTD) + 2 - is_single + (0, 1, 2, 4)[head & 3]

@@ -1,10 +1,10 @@
 """`jax.jit` whose traced programs persist from run to run, beside the compiled code.
 
-A second run finds compiled code by its program, for which jax traces and lowers the function anew. Here the program
-itself is read (`lowered_programs`); it goes through the same folder, checks and limits as compiled code
-(`compile_cache`). Its key is all that tracing depends on: sources of this package, versions, settings of jax, the
-function, static arguments, structure and shapes of the others. A run that makes a program calls what it has written, so
-that first and later runs compile one program.
+jax finds compiled code by its program, so that each run traces and lowers a function again. This module reads the
+program instead (`lowered_programs`), in the same folder and with the same checks and limits as compiled code
+(`compile_cache`). The key of a program contains all that tracing depends on: sources of this package, versions,
+settings of jax, the function, static arguments, structure and shapes of the others. A run that makes a program calls
+the program that it has written, so that first and later runs compile the same one.
 """
 
 import contextlib
@@ -30,23 +30,23 @@ from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.packed import inflated
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
 
-# Version of the format, part of each key: after a change, former programs are not found.
+# Version of the format, part of each key, so that programs of earlier formats are not found.
 _FORMAT = 1
-_FASTEST = 1  # of zlib
+_FASTEST = 1  # fastest level of zlib
 _SCALARS = (bool, int, float, complex)
-# Settings of one thread that programs depend on; those of the process are in `jax.config.values`.
+# Settings of a thread on which programs depend; settings of the process are in `jax.config.values`.
 _SETTINGS = (
     "jax_enable_x64",
     "jax_numpy_dtype_promotion",
     "jax_numpy_rank_promotion",
     "jax_default_matmul_precision",
 )
-# The folder of compiled code does not change programs; that of a run has another name each time.
+# Settings without effect on programs, such as the folder of compiled code, which differs between runs.
 _IRRELEVANT = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
-# A program that cannot be written, read or called; then jax traces the function, as ever.
+# Errors of programs that cannot be written, read or called; then jax traces the function as usual.
 _TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
 _UNREADABLE = (*_TROUBLE, struct.error)
-LARGEST_PROGRAM = 1 << 26  # bytes, not compressed
+LARGEST_PROGRAM = 1 << 26  # bytes before compression
 Function = TypeVar("Function", bound=Callable)
 
 
@@ -58,7 +58,7 @@ def persistent_jit(
 ) -> Any:
     """Compile a function like `jax.jit`, and keep its programs where compiled code is kept.
 
-    Inside of other compiled functions, and wherever a program cannot be kept, it is `jax.jit`.
+    Inside of other compiled functions, and wherever a program cannot be kept, it behaves as `jax.jit`.
     """
     static = (static_argnames,) if isinstance(static_argnames, str) else tuple(static_argnames)
     if function is None:
@@ -68,11 +68,11 @@ def persistent_jit(
 
     @functools.wraps(function)
     def call(*arguments: Any, **keywords: Any) -> Any:
-        # jax does not say the types of its settings.
+        # jax does not declare the types of its settings.
         if PROGRAMS in os.environ and not jax.config.jax_disable_jit:  # type: ignore[attr-defined]
             with contextlib.suppress(*_TROUBLE):
                 return programs.result(arguments, keywords)
-        # If something is wrong with the arguments, jax says what.
+        # Errors of arguments come from jax.
         return compiled(*arguments, **keywords)
 
     call.lower = compiled.lower  # type: ignore[attr-defined]
@@ -80,14 +80,14 @@ def persistent_jit(
 
 
 class _Program(NamedTuple):
-    # A function of arrays, the structure of its result, and the name of the file that it was read from, if it was.
+    # A function of arrays, the structure of its result, and the name of the file from which it was read, if it was.
     call: Callable
     tree: Any
     file: str | None
 
 
 class _Programs:
-    # Programs of one function, by all that they depend on within this process.
+    # Programs of a function, by everything on which they depend within this process.
 
     def __init__(self, function: Callable, static: tuple[str, ...], options: dict[str, Any] | None) -> None:
         self._function, self._static, self._options = function, static, options
@@ -104,7 +104,7 @@ class _Programs:
         key = (tree, shapes, typed, tuple([getattr(jax.config, name) for name in _SETTINGS]))
         make = functools.partial(self._made, leaves, tree, shapes, static)
         if key not in self._programs:
-            with self._lock:  # another thread may be making it
+            with self._lock:  # another thread may be making the same program
                 if key not in self._programs:
                     self._programs[key] = make()
         program = self._programs[key]
@@ -114,7 +114,7 @@ class _Programs:
             if program is None or program.file is None:
                 self._programs[key] = None
                 raise
-        # The program that was read cannot be used, or its compiled code cannot.
+        # The program from the file, or its compiled code, cannot be used.
         with self._lock:
             if self._programs[key] is program:
                 compile_cache.set_aside(program.file)
@@ -149,7 +149,7 @@ class _Programs:
             return None
 
     def _lowered(self, leaves: list, tree: Any, static: dict[str, Any]) -> tuple[Any, bytes]:
-        # Programs take and give arrays only: pytrees of this package's classes are made of them outside.
+        # Programs take and return arrays only; pytrees of this package's classes are flattened and rebuilt outside.
         from cspr_jax.runtime.lowered_programs import lowered
 
         trees = []
@@ -174,12 +174,12 @@ class _Programs:
         def called(*leaves: Any) -> list:
             return call(program, *leaves)
 
-        called.__name__ = name  # people see it while it is compiled
+        called.__name__ = name  # shown to users while it is compiled
         return jax.jit(called, compiler_options=self._options), tree_of(tree)
 
 
 def _name(function: Callable) -> str:
-    # The name belongs to the compiled function now, so identify the original by its module and line.
+    # The module's name now refers to the compiled function, so identify the original by its module and line.
     name = f"{function.__module__}:{function.__qualname__}"
     if not name.startswith(f"{__name__.partition('.')[0]}.") or "<" in name:
         raise Undescribed(name)
@@ -201,7 +201,7 @@ def _written(shapes: tuple) -> list:
 
 
 def _settings() -> list[str]:
-    # All settings of the process, whatever they mean, and those of this thread.
+    # All settings of the process, whatever their meaning, and those of this thread.
     of_process = [
         f"{name}={value}" for name, value in sorted(jax.config.values.items()) if not name.startswith(_IRRELEVANT)
     ]
@@ -214,7 +214,7 @@ def _versions() -> tuple[str, ...]:
 
 @functools.cache
 def checksum_of_sources(endings: tuple[str, ...] = (".py",)) -> str:
-    """Checksum of all files of the package that end so: times say too little, and reading them takes 15 ms."""
+    """Checksum of all files of the package with these endings; reading them takes 15 ms, and times are not reliable."""
     package, total = Path(__file__).parents[1], hashlib.sha256()
     for path in sorted(path for path in package.rglob("*") if path.suffix in endings):
         content = path.read_bytes()
@@ -223,7 +223,7 @@ def checksum_of_sources(endings: tuple[str, ...] = (".py",)) -> str:
 
 
 def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
-    # None where it is absent, incomplete, or another function's; then it is made again.
+    # Read a program; None where it is absent, incomplete or of another function, so that it is made again.
     try:
         data = inflated(compile_cache.plain_bytes(path), LARGEST_PROGRAM)
         checksum, _, content = data.partition(b"\n")
@@ -237,7 +237,7 @@ def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
 
 
 def _write(path: Path, key: str, description: Any, program: bytes) -> None:
-    # It may be a link to a damaged one of former runs: it is replaced, not written into.
+    # Replace the file instead of writing into it: it may be a link to a damaged file of former runs.
     content = json.dumps([key, description]).encode() + b"\n" + program
     checksum = hashlib.sha256(content).hexdigest().encode()
     partial = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")

@@ -1,4 +1,4 @@
-"""Environment of a process of the command line: settings of other libraries, and how many threads it may have."""
+"""Environment of a process of the command line: settings of other libraries, and checks of threads and memory."""
 
 import contextlib
 import errno
@@ -15,49 +15,49 @@ from pathlib import Path
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.cores import cores
 
-FEW = 4  # threads of every command, such as that for signals, besides one per core of NumPy's library
-OF_JAX, OF_JAX_PER_CORE = 16, 4  # threads of jax: some pools of XLA have one for each core
-# Threads of NumPy's and SciPy's library for linear algebra, and of all that use OpenMP. With our small matrices its
-# threads mostly wait in loops, which would take a fifth of the processor time of a plan.
+FEW = 4  # number of threads of every command, such as for signals, besides one per core of NumPy's library
+OF_JAX, OF_JAX_PER_CORE = 16, 4  # numbers of threads of jax, some of whose pools have one thread for each core
+# Variables with numbers of threads of NumPy's and SciPy's library for linear algebra, and of OpenMP. With our small
+# matrices these threads mostly wait in loops, which would take a fifth of the processor time of a plan.
 OF_OPENBLAS, OF_ALL_LIBRARIES = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"
-# Address space below which jax does not compile a plan on two cores, bytes.
+# Smallest address space in which jax compiles a plan on two cores, bytes.
 SMALLEST_MEMORY = 2_000_000_000
 _SMALL_STACK = 1 << 16  # bytes
 _LARGER = "or the limit of a container or a job, must be larger"
 _THREADS = f"no more threads can be started: `ulimit -u`, {_LARGER}"
 _PROCESSES = f"no more processes can be started: `ulimit -u`, {_LARGER}"
-# Messages of XLA, LLVM and the loader of shared objects when memory does not suffice.
+# Parts of messages of XLA, LLVM and the loader of shared objects about a lack of memory.
 _NO_MEMORY = ("RESOURCE_EXHAUSTED", "failed to map segment", "annot allocate memory", "nable to allocate", "bad_alloc")
 _MEMORY = f"memory does not suffice: `ulimit -v`, {_LARGER}"
 
 
 def configure() -> None:
-    """Keep settings that others made for their own programs from this process and those that it starts.
+    """Protect this process, and those that it starts, from settings that users made for other programs.
 
-    The command line opens no window, and its pictures do not depend on matplotlib's settings.
+    The command line opens no windows, and its pictures do not depend on matplotlib's settings.
     """
     if OF_ALL_LIBRARIES not in os.environ:
         os.environ.setdefault(OF_OPENBLAS, "1")
     os.environ["MPLBACKEND"] = "Agg"
-    os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: one of the user's may end the import of matplotlib
+    os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: a user's own may make the import of matplotlib fail
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
     if not sys.warnoptions:
-        # NumPy's warnings point to code of libraries; users get messages of this program instead. Workers inherit both
-        # settings.
+        # NumPy's warnings point to code of libraries; users get messages of this program instead. Workers inherit the
+        # settings of both warnings.
         warnings.filterwarnings("ignore", category=RuntimeWarning)
         os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
         Path.home()
     except RuntimeError:
-        # The user has no home folder, as in a container. Below this path no folder can be made, which all libraries
-        # know how to handle.
+        # The user has no home folder, as in a container. All libraries can handle a path below which no folder can be
+        # made.
         os.environ["HOME"] = os.devnull
 
 
 def defer_fortran() -> None:
-    """Load NumPy's interface to Fortran only where somebody uses it: SciPy asks for all names that NumPy has.
+    """Defer loading NumPy's interface to Fortran, which SciPy would load because it looks up all names of NumPy.
 
-    It takes as long as a fifth of jax.
+    Loading it takes a fifth of the time of loading jax.
     """
     name = "numpy.f2py"
     spec = None if name in sys.modules else importlib.util.find_spec(name)
@@ -70,10 +70,10 @@ def defer_fortran() -> None:
 
 
 def check_matplotlibrc() -> None:
-    """Refuse a matplotlibrc of the working folder that ends the import of matplotlib, which looks there first.
+    """Refuse a matplotlibrc in the working folder, where matplotlib looks first, that makes its import fail.
 
-    Such a file can also ask for the user's locale. Where the system does not have that one, programs use C instead,
-    and matplotlib is told so.
+    Such a file can also select the user's locale. Where the system lacks that locale, programs use C instead, and
+    so must matplotlib.
     """
     path = Path("matplotlibrc")
     must = "must be UTF-8 text that can be read, since matplotlib reads it in the working folder"
@@ -94,10 +94,10 @@ def check_matplotlibrc() -> None:
 
 
 def check_threads(processes: int | None = None) -> None:
-    """Refuse to begin where libraries could not start threads: they would end the process, or send it a Ctrl-C.
+    """Refuse to begin where libraries could not start threads, since they would end or interrupt the process.
 
-    With a number of processes, those of jax are counted too, in this process or in so many workers; and memory must
-    suffice for what jax compiles, since LLVM would end the process.
+    With a number of processes, the threads of jax in this process, or in that many workers, count too; and memory must
+    suffice for compiling, since LLVM would end the process otherwise.
     """
     count = FEW + cores()
     if processes is not None:
@@ -122,7 +122,7 @@ def check_threads(processes: int | None = None) -> None:
 
 
 def shortage(error: Exception) -> str | None:
-    """Name the resource that the machine lacks, if that is why something failed."""
+    """Name of the resource whose lack caused an error, if it did."""
     text = str(error)
     if isinstance(error, MemoryError) or (
         isinstance(error, RuntimeError | ImportError) and any(words in text for words in _NO_MEMORY)
@@ -136,7 +136,7 @@ def shortage(error: Exception) -> str | None:
 
 
 def quiet_scheduler() -> None:
-    """Keep the log of dask.distributed from standard error: its important messages become lines of ours."""
+    """Keep the log of dask.distributed from standard error; this program reports what matters itself."""
     with contextlib.suppress(ImportError):
         import distributed  # sets its loggers up when it is imported
 

@@ -1,7 +1,7 @@
-"""Worker processes of this machine, which divide the cores among them; none outlives its parent.
+"""Worker processes on this machine, which share its cores and end with their parent.
 
-Threads of one process run work outside of XLA one after the other, while XLA's own threads wait in loops: if much of
-the work is outside of XLA, one process for each core, with one thread, is faster.
+Threads of one process run work outside of XLA one after the other, while XLA's own threads wait in loops: if much work
+is outside of XLA, one process with one thread for each core is faster.
 """
 
 import concurrent.futures
@@ -21,9 +21,9 @@ from cspr_jax.numerics.cores import VARIABLE, cores
 from cspr_jax.runtime.process_environment import check_threads
 
 SAFE_PATH = "PYTHONSAFEPATH"
-LARGEST = 256  # workers
-LARGEST_USUAL = 8  # workers where the user gives no number, since each takes a GB
-GROUPS = 6  # for each worker: the first one that is done takes another
+LARGEST = 256  # largest number of workers
+LARGEST_USUAL = 8  # largest number of workers where the user gives none, since each takes a GB
+GROUPS = 6  # groups of items for each worker: whoever is done first takes another group
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
@@ -35,7 +35,7 @@ def check_count(count: int | None) -> None:
 
 
 def usual_count(parts: int) -> int:
-    """Number of processes for work that gains by them, where the user gives none."""
+    """Default number of processes for work that is faster in several."""
     import jax
 
     return max(1, min(cores(), LARGEST_USUAL, parts)) if jax.default_backend() == "cpu" else 1
@@ -44,25 +44,25 @@ def usual_count(parts: int) -> int:
 class Workers:
     """Worker processes, started when there is work for them.
 
-    They ignore Ctrl-C and SIGTERM, which reach the whole group: the process that started them decides.
+    They ignore Ctrl-C and SIGTERM, which the full process group receives: the process that started them handles these.
 
     Args:
         count: number of processes.
-        begin: function that each calls first; None: no function.
-        arguments: those of `begin`.
+        begin: function that each worker calls first; None: no function.
+        arguments: arguments of `begin`.
 
     Raises:
-        ResourceError: their threads could not be started.
+        ResourceError: threads of the workers could not be started.
     """
 
     def __init__(self, count: int, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
         """Start nothing yet."""
         check_threads(count)
-        # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
+        # A second Ctrl-C ends everything at once; Python's resource tracker need not complain about that.
         if _NO_COMPLAINT not in sys.warnoptions:
             sys.warnoptions.append(_NO_COMPLAINT)
-        # A child of multiprocessing is started with `python -c`, which looks for modules in the working folder first:
-        # a file struct.py that lies there would be executed. It reads this variable; no option can be given.
+        # multiprocessing starts children by `python -c`, which looks for modules in the working folder first and would
+        # execute a file struct.py there. This variable prevents that; no option can be given.
         self._settings = {SAFE_PATH: "1", VARIABLE: str(max(cores() // count, 1))}
         with _environment(self._settings):
             self._pool = concurrent.futures.ProcessPoolExecutor(
@@ -74,26 +74,26 @@ class Workers:
 
     def submit(self, function: Callable, *arguments: Any) -> concurrent.futures.Future:
         """Have a worker call a function."""
-        with _signals_blocked(), _environment(self._settings):  # workers inherit both from the start
+        with _signals_blocked(), _environment(self._settings):  # workers inherit both when they start
             return self._pool.submit(function, *arguments)
 
     def kill(self) -> None:
         """End all workers now."""
         # Python 3.14 has kill_workers() for this.
         for process in list((self._pool._processes or {}).values()):
-            with contextlib.suppress(OSError, ValueError):  # it may be gone
+            with contextlib.suppress(OSError, ValueError):  # the process may have ended
                 process.kill()
 
     def close(self) -> None:
-        """Wait for the end of running work; work that has not begun is given up."""
+        """Wait for running work to end, and cancel work that has not begun."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 
 class Spread:
-    """Spread of work on many items over worker processes, which end with the `with` block; one needs no worker.
+    """Distribution of work on many items over worker processes, which end with the `with` block.
 
     Args:
-        count: how many processes.
+        count: number of processes; with one, this process does the work.
     """
 
     def __init__(self, count: int) -> None:
@@ -129,7 +129,7 @@ class Spread:
 
 
 def balanced(costs: Sequence[float], count: int) -> list[list[int]]:
-    """Groups of items that take nearly equally long."""
+    """Groups of items, by index, that take nearly equally long."""
     groups: list[list[int]] = [[] for _ in range(min(count, len(costs)))]
     totals = [0.0] * len(groups)
     for k in sorted(range(len(costs)), key=lambda k: -costs[k]):

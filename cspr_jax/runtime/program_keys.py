@@ -1,4 +1,4 @@
-"""Descriptions of what decides a traced program, and of the pytrees that it returns: plain JSON, without pickle.
+"""Descriptions, in plain JSON, of values on which a traced program depends, and of the pytrees that it returns.
 
 A value that has no such description raises `Undescribed`, and its program is not kept.
 """
@@ -14,13 +14,13 @@ from typing import Any
 import jax
 import numpy as np
 
-# Names come from these packages alone: their versions, or their sources, are part of a key.
+# Packages whose names descriptions may contain: their versions, or their sources, are part of keys.
 _PACKAGES = ("cspr_jax", "builtins", "numpy", "jax")
 _PLAIN = (bool, int, str, type(None))
 
 
 class Undescribed(Exception):
-    """A value has no complete description that can be written down."""
+    """A value that has no complete description in JSON."""
 
 
 def described(value: Any) -> Any:
@@ -41,7 +41,7 @@ def _is_named(value: Any) -> bool:
     return isinstance(value, type) or (callable(value) and hasattr(value, "__qualname__"))
 
 
-# The first row that fits describes a value.
+# The first row whose test a value passes describes it.
 _KINDS: tuple[tuple[Callable[[Any], bool], Callable[[Any], Any]], ...] = (
     (lambda v: type(v) is float, lambda v: ["float", v.hex()]),
     (lambda v: isinstance(v, enum.Enum), lambda v: ["member", name_of(type(v)), v.name]),
@@ -68,7 +68,7 @@ def _fields(value: Any) -> dict[str, Any]:
 
 
 def name_of(thing: Any) -> str:
-    """Name by which a process finds a class or a function."""
+    """Name by which another process can find a class or a function."""
     name = f"{getattr(thing, '__module__', None) or 'builtins'}:{getattr(thing, '__qualname__', '')}"
     try:
         is_there = _named(name) is thing
@@ -109,7 +109,7 @@ def tree_of(description: Any) -> Any:
 
 
 def _value(description: Any) -> Any:
-    # Value from its description: the opposite of `described`, for the static parts of results.
+    # Value from its description: the inverse of `described`, for static parts of results.
     if type(description) in _PLAIN:
         return description
     kind, *parts = description

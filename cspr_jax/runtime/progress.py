@@ -1,4 +1,4 @@
-"""Progress: how far a sweep is, or the stage of the work. A terminal shows it all the time, a log once a minute."""
+"""Display of progress: finished cells of a sweep, or the stage of the work; continuous in a terminal, else by lines."""
 
 import contextlib
 import datetime
@@ -10,19 +10,19 @@ from collections.abc import Callable, Iterator
 from cspr_jax.errors import printable
 from cspr_jax.runtime import stages
 
-# Time between two lines where standard error is no terminal.
+# Time between lines, s, where standard error is no terminal.
 LINE_SECONDS = 60.0
 
 
 class RateEstimate:
-    """Rate of a sweep, and the time that it will still take.
+    """Rate of a sweep, and the remaining time.
 
     Args:
-        clock: gives seconds.
+        clock: function that returns the time in s.
 
     Fields:
         rate: cells a second; None before the first tile.
-        ends: time of the clock at which it will be done; None before the first tile.
+        ends: expected time of the clock at the end; None before the first tile.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -33,7 +33,7 @@ class RateEstimate:
         self.ends: float | None = None
 
     def advance(self, done: int, total: int) -> None:
-        """Take note of a finished tile; the first call says how many cells an earlier run has left."""
+        """Record a finished tile; the first call gives the number of cells that an earlier run has done."""
         seconds = self._clock()
         self._tiles += 1
         if self._tiles == 0:
@@ -41,13 +41,13 @@ class RateEstimate:
             return
         if self._tiles == 1:
             self._first = (done, seconds)
-        # The first tile holds the time of compiling: once there are others, they are counted alone.
+        # The first tile includes the time of compiling: leave it out as soon as there are others.
         cells, since = self._begin if self._tiles == 1 else self._first
         self.rate = (done - cells) / max(seconds - since, 1e-9)
         self.ends = seconds + (total - done) / self.rate if self.rate > 0.0 else None
 
     def left(self) -> str:
-        """Time that is left, in words."""
+        """Remaining time, in words."""
         if self.ends is None:
             return ""
         return f"{datetime.timedelta(seconds=round(max(self.ends - self._clock(), 0.0)))} left"
@@ -55,7 +55,7 @@ class RateEstimate:
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[int, int], None]]:
-    """Show how far a sweep is: in a bar at a terminal, elsewhere by a line a minute on standard error."""
+    """Show the progress of a sweep: by a bar in a terminal, elsewhere by a line a minute on standard error."""
     if not sys.stderr.isatty():
         with _lines() as on_tile:
             yield on_tile
@@ -63,10 +63,10 @@ def progress() -> Iterator[Callable[[int, int], None]]:
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 
     class Words(TextColumn):
-        """Words for the stage until the first tile is there; then for the rate and the time that is left."""
+        """Words for the stage until the first tile is done; then for the rate and the remaining time."""
 
         def render(self, task):
-            """The text of this moment; see `rich.progress.TextColumn`."""
+            """The current text; see `rich.progress.TextColumn`."""
             self.text_format = (
                 task.description if estimate.rate is None else f"{estimate.rate:,.0f} cells/s  {estimate.left()}"
             )
@@ -120,16 +120,16 @@ def _every_minute(line: Callable[[], str]) -> Iterator[None]:
 
 
 def _write(line: str) -> None:
-    with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
+    with contextlib.suppress(OSError, ValueError):  # standard error may be closed
         sys.stderr.write(f"cspr: {printable(line)}\n")
         sys.stderr.flush()
 
 
 @contextlib.contextmanager
 def waiting() -> Iterator[None]:
-    """Show the stage of the work while the block runs: on a terminal all the time, elsewhere by a line a minute.
+    """Show the stage of the work while the block runs: continuously in a terminal, elsewhere by a line a minute.
 
-    How much work begins is written at once. Nothing may be printed meanwhile.
+    Announced amounts of work are written at once. The block must not print anything.
     """
     if not sys.stderr.isatty():
         latest = ["starting"]
@@ -156,5 +156,5 @@ def _bar(*columns):
     from rich.console import Console
     from rich.progress import Progress
 
-    # Standard output may go elsewhere: it is not drawn into the terminal of standard error.
+    # Standard output may go elsewhere: do not redirect it to the terminal of standard error.
     return Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False)

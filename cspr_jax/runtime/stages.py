@@ -1,4 +1,4 @@
-"""Stages of the work, for people who wait. They are announced here, and shown by a listener; nothing is printed."""
+"""Announcements of stages of the work, for users who wait; listeners show them, and this module prints nothing."""
 
 import contextlib
 import threading
@@ -8,7 +8,7 @@ Listener = Callable[[str], None]
 
 
 class _Board:
-    # The board shows the work in progress: its parts from the outside in, and the function that each thread compiles.
+    # The work in progress: nested parts, outermost first, and the function that each thread compiles.
 
     def __init__(self) -> None:
         self.listener: Listener | None = None
@@ -22,7 +22,7 @@ class _Board:
         if listener is None:
             return
         parts = [*self.around, self.now]
-        # Mostly the function whose compilation began last is waited for longest.
+        # The function whose compilation began last usually takes longest.
         parts += [f"compiling {name}" for name in list(self.compiling.values())[-1:]]
         listener(": ".join(part for part in parts if part))
 
@@ -37,14 +37,14 @@ def stage(text: str) -> None:
 
 
 def amount(text: str) -> None:
-    """Announce how much work begins now, if that may take minutes."""
+    """Announce the amount of work that begins now, if it may take minutes."""
     if _board.amount_listener is not None:
         _board.amount_listener(text)
 
 
 @contextlib.contextmanager
 def within(text: str) -> Iterator[None]:
-    """Announce work of which the stages of a block are parts."""
+    """Announce work whose parts are the stages of the block."""
     _board.around.append(text)
     stage("")
     try:

@@ -1,6 +1,6 @@
-"""Text on a terminal, or where its output goes: signs that its encoding lacks, tables, and text from others.
+"""Text on a terminal or in a redirected stream: characters that its encoding lacks, tables, and texts from files.
 
-A name that somebody wrote must neither control a terminal nor change how a table looks: all text passes
+A name in a file must neither control a terminal nor change how a table looks: all text passes
 `cspr_jax.errors.printable`, and none of it is parsed as markup.
 """
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 _PLAINER = "cspr_jax.plainer"
-# These stand in for signs that units, tables and progress use, where the encoding lacks them.
+# Replacements of characters in units, tables and progress that an encoding may lack.
 _PLAIN = {
     **{"→": "->", "∞": "inf", "±": "+-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "≤": "<=", "≥": ">="},
     **{"²": "^2", "³": "^3", "°": " deg", "Δ": "d", "…": "...", "’": "'", "‘": "'", "“": '"', "”": '"'},
@@ -22,11 +22,11 @@ _PLAIN = {
 
 
 def _plainer(error: UnicodeError) -> tuple[str | bytes, int]:
-    # An error handler of codecs: one sign at a time.
+    # Error handler of codecs, which replaces one character at a time.
     if not isinstance(error, UnicodeEncodeError):
         raise error
     sign = error.object[error.start]
-    if "\udc80" <= sign <= "\udcff":  # a byte of a file's name, which is printed as it is
+    if "\udc80" <= sign <= "\udcff":  # a byte of a file's name that is not valid text: written unchanged
         return bytes([ord(sign) - 0xDC00]), error.start + 1
     return _PLAIN.get(sign) or sign.encode("ascii", "backslashreplace").decode("ascii"), error.start + 1
 
@@ -35,40 +35,40 @@ codecs.register_error(_PLAINER, _plainer)
 
 
 def encodable(stream: IO[str]) -> None:
-    """Have a stream write whatever is printed: signs that its encoding lacks become plainer ones, or escapes."""
+    """Make a stream accept any text: characters that its encoding lacks become plainer ones, or escapes."""
     if isinstance(stream, io.TextIOWrapper):
         stream.reconfigure(errors=_PLAINER)
 
 
 def plainer(text: str, encoding: str | None) -> str:
-    """Text as a stream of an encoding shows it."""
+    """Text as a stream of this encoding shows it."""
     return text.encode(encoding, _PLAINER).decode(encoding) if encoding else text
 
 
 def cell(*lines: object, style: str = "") -> "Text":
-    """A cell, a head, a title or a note of a table of rich, in which nothing is markup."""
+    """Text of a cell, head, title or note of a table of rich, which is not parsed as markup."""
     from rich.text import Text  # imported only where tables are printed
 
     return Text("\n".join(map(printable, lines)), style=style)
 
 
 def print_table(renderable: Any, file: TextIO) -> None:
-    """Print a table of rich whose texts are its `Text`; it is changed where the encoding lacks signs."""
+    """Print a table of rich whose texts are instances of `Text`; characters that the encoding lacks are replaced."""
     from rich.console import Console as Usual
 
     class Console(Usual):
         def on_broken_pipe(self) -> None:
-            # The usual one ends the process, with an exit code that means something else here.
+            # rich would end the process, with an exit code that has another meaning in this program.
             raise BrokenPipeError
 
     _fit(renderable, file.encoding)
-    # A pipe gets lines of a width of its own, so that no column is folded.
+    # Lines for a pipe get a fixed width, so that no column is folded.
     width = None if file.isatty() else 140
     Console(file=file, width=width, highlight=False, markup=False, emoji=False).print(renderable)
 
 
 def _fit(part: Any, encoding: str | None) -> None:
-    # Before columns get their widths, since a plainer sign may be longer.
+    # Replace characters before columns get their widths, since replacements may be longer.
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

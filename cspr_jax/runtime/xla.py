@@ -1,7 +1,7 @@
 """Settings that the command line makes before jax starts: vector width, folder of compiled code, device, memory arenas.
 
-They are environment variables, which processes that are started from here inherit; arenas are set for this process too.
-Settings of the user win. From Python, only `keep_compiled_code` uses this module.
+They are environment variables, which child processes inherit; arenas are set for this process too. The user's own
+settings take precedence. From Python, only `keep_compiled_code` uses this module.
 """
 
 import ctypes
@@ -26,30 +26,30 @@ from cspr_jax.numerics.cores import VARIABLE, cores, quota
 from cspr_jax.runtime import compile_cache, stages
 from cspr_jax.runtime.compile_options import QUICK
 
-# Twice as fast where the processor has such vectors; XLA chooses half their width by itself.
+# Vectors of this width make code twice as fast on processors that have them; XLA's default is half of it.
 WIDE, WIDE_FEATURE = "--xla_cpu_prefer_vector_width=512", "avx512f"
 PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
-# glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
-# arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
-# is M_ARENA_MAX of malloc.h.
+# glibc gives each thread an arena of its own, and XLA has many threads: memory that one frees, the others cannot use.
+# With four arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The
+# last number is M_ARENA_MAX of malloc.h.
 ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
 _LONGEST_REASON = 200
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
-# jax tells when it has lowered a function, which it then compiles, and when that is done.
+# Events of jax: it has lowered a function, which it then compiles; and it has compiled the function.
 _LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
 _COMPILED = "/jax/core/compile/backend_compile_duration"
 _listeners: list[Any] = []
-# XLA complains of slow compiling, with advice to file a bug, as an error in its log; errors that stop something come as
-# exceptions, or are fatal and shown still.
+# XLA logs slow compiling as an error, with the advice to file a bug; real errors come as exceptions, or are fatal and
+# still shown.
 _ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
 CACHE = "JAX_COMPILATION_CACHE_DIR"
 _KEPT = {
-    # Without this, the name of the folder would be part of the key of each entry.
+    # Otherwise the name of the folder would be part of the key of each entry.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
 }
-# The same settings for a jax that is imported already.
+# The same settings for jax if it is already imported.
 _VALUES = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": 0.05, "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": -1}
 
 
@@ -60,10 +60,10 @@ def prepare(
     quick: bool = False,
     prefers_cpu: bool = False,
 ) -> None:
-    """Set the variables that jax reads when it is imported; nothing if it has been imported."""
+    """Set the variables that jax reads when it is imported, unless it has been imported."""
     if "jax" in sys.modules:
         return
-    if device != "gpu":  # a user who asks for a GPU sees why there is none
+    if device != "gpu":  # a user who requests a GPU sees why there is none
         os.environ.setdefault(*_ONLY_FATAL)
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
@@ -100,12 +100,12 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
     before = set(os.environ)
     run_folder = _keep(shared, _warn_of_python)
     if run_folder is not None and loaded is not None:
-        # It has read the environment when it was imported.
+        # jax has read the environment when it was imported: set its configuration.
         for name in {CACHE, *_KEPT} - before:
             loaded.config.update(name.lower(), _VALUES.get(name, os.environ[name]))
         from jax.experimental.compilation_cache import compilation_cache
 
-        compilation_cache.reset_cache()  # else a jax that has compiled without a folder goes on without
+        compilation_cache.reset_cache()  # otherwise jax would go on without a folder if it has compiled without one
     return run_folder
 
 
@@ -126,7 +126,7 @@ def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
 
 
 def check_device(device: str | None) -> None:
-    """Refuse a device that is not there; starts jax where one is asked for, by the user or by JAX_PLATFORMS."""
+    """Refuse a device that does not exist; this starts jax if the user or JAX_PLATFORMS requests a device."""
     try:
         import jax
     except ValueError as error:
@@ -137,7 +137,7 @@ def check_device(device: str | None) -> None:
         return
     try:
         kind = jax.devices()[0].platform
-    except (RuntimeError, AssertionError) as error:  # jax asserts that what it is to start can be started
+    except (RuntimeError, AssertionError) as error:  # jax fails by an assertion if a platform cannot be started
         named = f"{platforms}: must name what jax finds here, such as cpu"
         raise ConfigError("JAX_PLATFORMS", f"{named}: {error}" if str(error) else named) from error
     if device != "gpu":
@@ -147,7 +147,7 @@ def check_device(device: str | None) -> None:
 
 
 def tell_compiling() -> None:
-    """Announce each function that jax compiles, for people who wait; imports jax."""
+    """Announce each function that jax compiles to users who wait; imports jax."""
     import jax
 
     def listen(event: str, duration_secs: float, **keywords: str | int) -> None:
@@ -163,12 +163,12 @@ def tell_compiling() -> None:
 
 
 def _readable(name: str) -> str:
-    # The name comes as jit(_first_look), or jit__first_look.
+    # jax gives names such as jit(_first_look), or jit__first_look.
     return re.sub(r"^jit[(_]|\)$", "", name).replace("_", " ").strip()
 
 
 def _few_arenas() -> None:
-    # The variable is read when a process starts: it is for processes that are started from here.
+    # glibc reads the variable when a process starts: it serves child processes.
     is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
     if is_set or platform.libc_ver()[0] != "glibc":
         return
@@ -177,7 +177,7 @@ def _few_arenas() -> None:
 
 
 def _folder(setting: str | Path | None, warn: Callable[[str], None]) -> Path | None:
-    # The folder belongs to this processor, this jaxlib and this Python: code for another one must not run here.
+    # The name of the folder depends on processor, jaxlib and Python, since code for others must not run.
     setting = os.environ.get("CSPR_CACHE_DIR") if setting is None else setting
     if setting == "":
         return None
@@ -202,7 +202,7 @@ def _folder(setting: str | Path | None, warn: Callable[[str], None]) -> Path | N
 
 
 def _versions() -> tuple[str, str]:
-    # jaxlib is asked for its version itself: an installer may have noted that of another jaxlib, or none.
+    # Ask jaxlib itself for its version: the metadata of an installer may be wrong or missing.
     import jaxlib.version
 
     try:
@@ -220,11 +220,11 @@ def _processor() -> tuple[str, ...]:
 
 
 def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
-    # XLA reads a value that does not begin with a dash as the name of a file of flags: ours cannot be added.
+    # XLA reads a value without a leading dash as the name of a file of flags, to which ours cannot be added.
     if settings.strip() and not settings.lstrip().startswith("-"):
         return settings
-    # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since all of the words
-    # are part of the key of compiled code.
+    # If a flag is set twice, XLA takes the last setting, which is the user's. Leave ours out then, since the full
+    # text is part of the key of compiled code.
     ours = [WIDE] if WIDE_FEATURE in _processor() else []
     named = [word.partition("=")[0] for word in settings.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]
@@ -232,15 +232,15 @@ def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
 
 
 def accepted_flags(folder: Path, flags: Sequence[str]) -> list[str]:
-    """Flags that this XLA knows, of some: it ends a process whose XLA_FLAGS name another one."""
+    """Keep only flags that this XLA knows, since it ends a process whose XLA_FLAGS name unknown ones."""
     refusal = _refusal(folder, " ".join(flags)) if flags else ""
-    if refusal is None:  # there was no answer
+    if refusal is None:  # the test gave no result
         return []
     return [flag for flag in flags if not refusal or _is_accepted(folder, flag)]
 
 
 def _check_flags(folder: Path | None, flags: str) -> None:
-    # In a file they may change from one time to the next.
+    # Flags in a file may change, so that results are not recorded.
     record_folder = folder if flags.lstrip().startswith("-") else None
     reason = _refusal(record_folder, flags)
     if reason:
@@ -252,8 +252,8 @@ def _is_accepted(folder: Path, flags: str) -> bool:
 
 
 def _refusal(folder: Path | None, flags: str) -> str | None:
-    # XLA ends the process that names a flag it does not know: another one tries, once. "" where it takes them, None
-    # where there was no answer.
+    # XLA ends a process that names a flag it does not know: try flags in another process, once. Return "" if it accepts
+    # them, None if the test gave no result.
     record = None if folder is None else folder / "flags.json"
     try:
         answers = {} if record is None else json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
@@ -265,7 +265,7 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
     if isinstance(answers.get(flags), str) and answers[flags]:
         return answers[flags]
     settings = os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "2"}
-    # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
+    # -P: no file in the working folder is executed. The process has its own session: a Ctrl-C must not end the test.
     words, silent, pipe = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL, subprocess.PIPE
     try:
         done = subprocess.run(
@@ -273,7 +273,7 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    if done.returncode in (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL):  # somebody ended it: it has not answered
+    if done.returncode in (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL):  # somebody ended it: there is no result
         return None
     reason = _reason(done.stderr.decode("utf-8", "replace")) if done.returncode else ""
     if record is not None:
@@ -289,6 +289,6 @@ def _refusal(folder: Path | None, flags: str) -> str | None:
 
 
 def _reason(log: str) -> str:
-    # Its log says why in the first line of an error, after the location in XLA's code.
+    # The log gives the reason in the first line of an error, after the location in XLA's code.
     lines = [line.partition("] ")[2] for line in log.splitlines() if line[:1] in ("E", "F")]
     return printable(next(filter(None, lines), "it ends the process"))[:_LONGEST_REASON]

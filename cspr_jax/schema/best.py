@@ -1,8 +1,8 @@
 """Best points of an axis that may be chosen freely, such as z0.
 
-Every cell of the other axes takes all of its quantities from one point of that axis: a feasible one if there is one,
-else an undecided one; among several, the one with the fewest arcs, or the best in what else the map is about; among
-equals, the one with the largest margin.
+Every cell of the other axes takes all of its quantities from one point of that axis: a feasible point if there is one,
+else an undecided one; among several, the point with the fewest arcs, or the best value of the map's main quantity;
+among equals, the point with the largest margin.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from cspr_jax.schema.meanings import CELL_SIDES
 from cspr_jax.schema.quantities import AXES, BEST, QUANTITIES, best_name
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.
+# Unless the kind of map names others, these quantities are compared first, then all others that have a better side.
 FIRST = ("arcs", "oscillations", "release_speed", "margin")
-# In these counts 0 stands for none, and fewer may be possible where a point is undecided.
+# Counts in which 0 stands for none; an undecided point may be feasible with fewer.
 COUNTS = ("arcs", "oscillations")
 _DOUBT = Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value
 _INSIDE, _OUTSIDE = CELL_SIDES.index("inside"), CELL_SIDES.index("outside")
 
 
 class Best(NamedTuple):
-    """Arrays reduced over one of their axes, and the indices of the best points in it.
+    """Arrays reduced over one of their axes, and the indices of the best points on that axis.
 
     Fields:
-        data: by name; that of `schema.quantities.best_name` is the best point itself, NaN where no point will do.
-        indices: (...) of the best point in the axis, of the best candidate where none will do.
+        data: arrays by name; `schema.quantities.best_name` is the coordinate of the best point, NaN where none will do.
+        indices: (...) index of the best point on the axis, or of the best candidate where none will do.
     """
 
     data: dict[str, np.ndarray]
@@ -39,7 +39,7 @@ class Best(NamedTuple):
 
 
 def check_axis(axis: str, names: Sequence[str]) -> None:
-    """Refuse an axis of which no best point can be chosen."""
+    """Refuse an axis on which no best point can be chosen."""
     allowed = [name for name in names if name not in AXES or best_name(name) in BEST]
     if axis not in allowed:
         raise InputError("--best", axis, f"one of {', '.join(allowed)}" if allowed else "absent: there is no such axis")
@@ -73,20 +73,20 @@ def best_of(
 
 
 def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> list[str]:
-    """Quantities that tell which of two cells is better, the first one first."""
+    """Quantities by which cells are compared, in order."""
     order = dict.fromkeys((*pictured, *FIRST, *QUANTITIES))
     return [name for name in order if name in names and QUANTITIES[name].better]
 
 
 def _unfitness(verdict: np.ndarray) -> np.ndarray:
-    # Return 0: feasible, if not surely with the fewest arcs; 1: undecided; 2: not feasible; 3: not even accessible.
+    # Rank: 0: feasible, perhaps with fewer arcs; 1: undecided; 2: not feasible; 3: not even accessible.
     flags = verdict.astype(np.int64)
     rank = np.where(flags & Verdict.UNDECIDED.value, 1, np.where(flags & Verdict.NOT_ACCESSIBLE.value, 3, 2))
     return np.where(flags & ~Verdict.FEWER_ARCS_UNDECIDED.value, rank, 0)
 
 
 def _badness(name: str, values: np.ndarray) -> np.ndarray:
-    # Return a number that is smaller for a better value; infinite without a value.
+    # A number that is smaller for better values; infinite without a value.
     drawn = values.astype(float)
     worse = drawn if QUANTITIES[name].better == "smaller" else -drawn
     is_none = np.isnan(drawn) | ((drawn <= 0.0) if name in COUNTS else False)
@@ -100,7 +100,7 @@ def _selected(values: np.ndarray, indices: np.ndarray, dimension: int) -> np.nda
 
 
 def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np.ndarray, dimension: int) -> np.ndarray:
-    # An undecided point may be feasible with fewer arcs than the best of the feasible points.
+    # An undecided point may turn out feasible with fewer arcs than the best feasible point.
     count = next((reduced[name] for name in COUNTS if name in reduced), None)
     if count is None:
         return reduced["verdict"]
@@ -110,6 +110,6 @@ def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np
 
 
 def _side(sides: np.ndarray, dimension: int) -> np.ndarray:
-    # A cell is proved inside if it is so for some point, and outside if it is so for every one.
+    # A cell is proved inside if it is for some point, and outside if it is for every point.
     is_inside, is_outside = (sides == _INSIDE).any(dimension), (sides == _OUTSIDE).all(dimension)
     return np.where(is_inside, _INSIDE, np.where(is_outside, _OUTSIDE, 0)).astype(sides.dtype)

@@ -1,4 +1,4 @@
-"""Answers whose fields are columns. The tables of quantities are imported only where their words are needed."""
+"""Answers whose fields are columns. Tables of quantities are imported only where units and names are needed."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ class Columns:
     """Answers whose fields are columns: arrays with a value for each of n cases."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Keep dataclasses from writing every number of every column out."""
+        """Replace the repr of dataclasses, which would print every number of every column."""
         super().__init_subclass__(**keywords)
         cls.__repr__ = Columns.__repr__  # type: ignore[method-assign]
 
@@ -36,7 +36,7 @@ class Columns:
         return labelled.over(self.arrays(), dims)
 
     def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The answers at the best point of one dimension; the answers are those of all combinations, as of a map."""
+        """The answers at the best point of one dimension, for answers to all combinations of coordinates, as in maps."""
         from cspr_jax.schema import labelled
         from cspr_jax.schema.best import best_of, check_axis
 

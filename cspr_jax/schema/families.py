@@ -1,6 +1,6 @@
 """Table of trajectory families: one row for each.
 
-A new family is a motion (`motion.motion.Motion`), a class that joins poses by it (`motion.leg.Leg`), and a row.
+A new family needs a motion (`motion.motion.Motion`), a class that joins poses by it (`motion.leg.Leg`), and a row.
 """
 
 import contextlib
@@ -11,8 +11,8 @@ from typing import Any
 
 from cspr_jax.schema.plugins import ExtensibleRows
 
-# Proofs on which answers of a family can rest. Its own are faster, and take cables for lines from points: plans prove
-# its motions once more, as any motion, where there are pulleys or bodies that can meet.
+# Proofs on which answers of a family can rest. A family's own proofs are faster, but treat cables as lines from points:
+# where there are pulleys, or bodies that can collide, plans prove its motions again like any motion.
 PROOFS = {
     "any": "the proof of any motion, which knows pulleys, bodies that can meet, and uncertainties",
     "robust": "one of its own, which knows uncertainties on as many cables as degrees of freedom",
@@ -25,22 +25,21 @@ class Family:
     """Trajectory family.
 
     Fields:
-        name: in files.
-        description: for people, without a full stop.
-        legs: by patterns of motion of the robots that it moves, rows of `robots.model.patterns`, the class that joins
-            poses: "module:Class".
-        free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
-        rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
-            function.
+        name: name in files.
+        description: a phrase for people, without a full stop.
+        legs: for each pattern of motion of the robots that it moves, a row of `robots.model.patterns`, the class that
+            joins poses: "module:Class".
+        free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) instead of (2.49).
+        rests_anywhere: whether its motions rest at all poses, so that it has neither P0 nor an amplitude function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
-        takes_amplitude: whether its motions follow the plan's amplitude function, and not a law of their own.
-        keys: keys of a plan that only this family takes, and others that name them too.
-        pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
-        end_keys: likewise, if it leads to the pose or from it.
-        proof: what its answers rest on, a row of `PROOFS`.
-        is_searched: whether its motions are searched for, also from those of other families.
-        begins_searches: whether such searches begin from its motions: where they find nothing else, or nothing fast.
-        precedes_searches: whether they do so at once, and their motions are never slower than its motions.
+        takes_amplitude: whether its motions follow the plan's amplitude function, rather than a law of their own.
+        keys: keys of a plan that are allowed only with this family, and with others that list them too.
+        pose_keys: likewise keys of a pose to which the family leads.
+        end_keys: likewise keys of a pose to which, or from which, the family leads.
+        proof: proof on which its answers rest, a row of `PROOFS`.
+        is_searched: whether its motions are found by a search, which may begin from motions of other families.
+        begins_searches: whether such searches begin from its motions, where they find nothing else or nothing fast.
+        precedes_searches: whether such searches begin from its motions at once, and never give slower motions.
     """
 
     name: str
@@ -64,7 +63,7 @@ class Family:
         return getattr(importlib.import_module(module), name)
 
 
-# Time functions of a platform's rotation that take no beta-hat.
+# Time functions of a platform's rotation that have no parameter beta-hat.
 WITHOUT_BETA_HAT = ("beta_0", "beta_1")
 # All rows of `robots.model.patterns`.
 ANY_PATTERN = ("1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R")

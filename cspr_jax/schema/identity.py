@@ -1,4 +1,4 @@
-"""Identity of a result: the hash of everything that decides its numbers."""
+"""Identity of a result: the hash of everything that determines its numbers."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""Arrays under the names of the table of quantities, as datasets of xarray with units and long names."""
+"""Arrays by name of their quantities, as datasets of xarray with units and long names."""
 
 import math
 from collections.abc import Mapping
@@ -14,13 +14,13 @@ from cspr_jax.schema.quantities import ACROSS, EVERY, OTHER_DIMS, PARTS, SEGMENT
 if TYPE_CHECKING:
     import xarray
 
-# Answers with a value at either end of a segment have an axis of these two points.
+# Points of the axis of answers that have a value at each end of a segment.
 ENDS = ("start", "target")
 CONTROL_POINTS = ("start", "middle", "end")
 
 
 def need_xarray() -> None:
-    """Refuse to begin the computation of a dataset where xarray is missing."""
+    """Raise an error if xarray is missing, before a dataset is computed."""
     try:
         import xarray  # noqa: F401
     except ImportError as error:
@@ -45,7 +45,7 @@ def dataset(
 
 
 def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "xarray.Dataset":
-    """A motion: rows over time, and what there is of its segments."""
+    """A motion as a dataset: rows over time, and quantities of its segments."""
     cables = range(1, arrays["tension"].shape[1] + 1)
     axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
     used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in OTHER_DIMS.get(name, ())}
@@ -83,7 +83,7 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
         data["beta_hat"].attrs = {
             "units": "1",
             "long_name": "beta-hat",
-        }  # the table describes the value at the target alone
+        }  # the table of quantities describes only the value at the target
     return data
 
 

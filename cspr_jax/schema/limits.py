@@ -5,9 +5,9 @@ from typing import Any, Literal
 
 from cspr_jax.schema.verdicts import Verdict
 
-# Numbers of arcs that files and arguments may ask for.
+# Largest numbers of arcs, and of intervals of a grid, in files and arguments.
 LARGEST_MAX_ARCS, LARGEST_GRID = 1000, 100_000
-# Multiples of an uncertainty are not followed further.
+# Largest multiple of an uncertainty that is tried.
 LARGEST_MULTIPLE = 1000.0
 
 
@@ -17,10 +17,10 @@ class Uncertain:
 
     Fields:
         name: key in files, and field of `robots.model.limits.Uncertainty`.
-        unit: of its values.
-        smallest: value, of a robot without this uncertainty.
+        unit: unit of its values.
+        smallest: smallest value, of a robot without this uncertainty.
         largest: largest value.
-        description: for the reference.
+        description: text for the reference.
     """
 
     name: str
@@ -48,19 +48,19 @@ class Limit:
 
     Fields:
         name: key in files, and field of `robots.model.limits.Limits`.
-        flag: the verdict where it is broken.
-        sense: whether the quantity must be at least or at most so large.
-        quantity: of `motion.limits.Values`.
-        unit: of both.
+        flag: flag of verdicts where it is violated.
+        sense: whether it is a lower ("least") or an upper ("most") limit.
+        quantity: field of `motion.limits.Values` that it bounds.
+        unit: unit of the limit and of the quantity.
         per_cable: whether each cable has a value of its own.
-        of_motion: whether the quantity depends on how the effector moves, not only on where it is.
-        from_zero: whether 0 is allowed, besides positive values; ignored for coordinates.
-        description: for the reference.
-        legend: words of its colour in maps.
-        colour: of cells that break it.
-        chart: chart of a motion that shows where it is broken; "": that of the path.
-        peak: field of `motion.peaks.Peaks` that reports give under the name of the limit; "": none.
-        seconds: time that its proof takes in a cell with 30 arcs, before what `CellCost` says of a kind of map.
+        of_motion: whether the quantity depends on the motion of the effector, not on its pose alone.
+        from_zero: whether 0 is allowed in addition to positive values; ignored for coordinates.
+        description: text for the reference.
+        legend: words for its colour in maps.
+        colour: colour of cells that violate it.
+        chart: chart of a motion that shows where it is violated; "": the chart of the path.
+        peak: field of `motion.peaks.Peaks` that reports show under the name of the limit; "": none.
+        seconds: time that its proof takes in a cell with 30 arcs; `CellCost.limits` of a kind of map multiplies it.
     """
 
     name: str
@@ -85,12 +85,12 @@ class Limit:
 
     @property
     def is_height(self) -> bool:
-        """Tell whether it is a height, of any sign, and not a length or a rate."""
+        """Tell whether it is a height, which may have any sign, rather than a length or a rate."""
         return self.quantity == "depth"
 
     @property
     def of_mass_centre(self) -> bool:
-        """Tell whether it bounds how fast the mass centre moves."""
+        """Tell whether it bounds speed or acceleration of the mass centre."""
         return self.quantity.startswith("mass_centre")
 
     @property
@@ -119,7 +119,7 @@ def _of_mass_centre(name: str, flag: Verdict, quantity: str, unit: str, **more: 
     return Limit(name, flag, "most", peak, unit, False, True, False, words, peak=peak, **more)
 
 
-# In the order of their slacks. The floor is z in the axes of a file, and a depth in the kernels': at most so deep.
+# Rows are in the order of slacks. The floor is a z coordinate in files, and a largest depth in the kernels' axes.
 LIMITS = (
     _of_tension(
         "tension_min", Verdict.SLACK_CABLE, "smallest tension", "least", legend="slack cable", colour="#56B4E9"

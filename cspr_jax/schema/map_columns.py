@@ -1,4 +1,4 @@
-"""Columns that kinds of maps have in common, those of workspaces, and the keys of sweep files that ask for these."""
+"""Columns that kinds of maps have in common, columns of workspaces, and keys of sweep files that request them."""
 
 from cspr_jax.schema.quantities import REFUSALS
 

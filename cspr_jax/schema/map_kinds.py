@@ -1,8 +1,8 @@
-"""The one table of the kinds of maps: what each asks of a sweep file, what it gives, and the class that computes it.
+"""Table of the kinds of maps: what each requires of a sweep file, its quantities, and the class that computes it.
 
-A kind from outside of the package is a subclass of `maps.grid_map.GridMap`, its row, and the rows of its own
-quantities; the module that holds them gives the rows to `register`. They hold in the process that has imported that
-module, and then in all that `cspr_jax.cli.main` does there. Other processes that compute tiles, and workers of a
+A kind from outside of the package consists of a subclass of `maps.grid_map.GridMap`, its row, and rows of its own
+quantities; the module that defines them passes the rows to `register`. They are valid in the process that has imported
+this module, for all that `cspr_jax.cli.main` does there. Other processes that compute tiles, and workers of a
 scheduler, get the row with the sweep and import the class by its name, "module:Class": they must find that module.
 """
 
@@ -34,37 +34,36 @@ class MapKind:
     """A kind of map. Keys of sweep files are dotted, such as "axes.tau".
 
     Fields:
-        name: as sweep files give it.
-        title: of its results.
+        name: name in sweep files.
+        title: title of its results.
         description: a phrase for the reference.
         implementation: "module:Class" of its `maps.grid_map.GridMap`.
-        quantities: what it gives, all rows of `schema.quantities.QUANTITIES`.
-        stored: quantities that are stored where the sweep file names none.
-        stored_with: by key, quantities that are stored besides where that key is given. A key that came later than its
-            map thus leaves what is stored without it, and the identities of older sweeps, as they were.
-        only_with: quantities, and the keys without which they are no numbers: stored only where one of these is given.
-            A condition of a workspace is a key, too: "workspace.conditions.static".
-        rows: quantities whose rows here say more about this kind than those of the table; names, units and types are
-            the same.
+        quantities: its quantities, all of them rows of `schema.quantities.QUANTITIES`.
+        stored: quantities that are stored by default.
+        stored_with: for some keys, quantities that are stored in addition if the key is given. So a key that is newer
+            than its map does not change what older sweeps store, nor their identities.
+        only_with: for some quantities, keys without which they have no values: they are stored only if one of these is
+            given. A condition of a workspace counts as a key, too: "workspace.conditions.static".
+        rows: rows of quantities with descriptions for this kind; names, units and types are those of the table.
         planned: whether a cell is the motion of a plan of two poses, which `plans.cell_plan` writes.
-        pictured: quantities of which a picture shows the first one that is stored, where nobody says which.
+        pictured: quantities of which a picture shows, by default, the first one that is stored.
         motionless: quantities that belong to a position or a time, not to a motion.
         families: trajectory families that it takes; none: its cells are positions, without a motion.
-        start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
-            `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
-            orientation or without, at rest in P0 where it is absent.
+        start: start of its motions. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": given by
+            `trajectory.from` or the axes from_x, from_y and from_z; "pose": given by `trajectory.from`, with an
+            orientation or without; at rest in P0 where it is absent.
         needs: keys that must be given.
         takes: further keys that may be given, of those that only some kinds have.
         one_of: keys of which exactly one must be given.
         limits: rows of `schema.limits.LIMITS` that it takes where it takes limits; none: all.
-        definitions: of the accessible set that it takes.
-        is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
-        cells: of a tile, at most, where the sweep file does not say.
-        cost: of a cell, by which a run is divided into tiles.
-        patterns: of motion of the robots that it moves, rows of `robots.model.patterns`, by which `config.equivalents`
-            finds which robot that is; none: robots go to its class as their files have them.
-        by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
-            of the work is outside of XLA, where threads of one process wait for each other.
+        definitions: definitions of the accessible set that it takes.
+        is_over_orientations: whether its grid has axes over all orientations in addition to those of the sweep file.
+        cells: largest number of cells of a tile, by default.
+        cost: cost of a cell, by which a run is divided into tiles.
+        patterns: patterns of motion of the robots that it moves, rows of `robots.model.patterns`, by which
+            `config.equivalents` chooses a robot or its equivalent; none: its class takes robots as in their files.
+        by_processes: whether the command line uses several processes for its tiles by default, since much of the work
+            is outside of XLA, where threads of one process wait for each other.
         variants: rows of the same name for further trajectory families.
     """
 
@@ -109,11 +108,11 @@ class MapKind:
         return (*self.needs, *self.takes, *self.one_of)
 
     def keys_of(self, quantity: str) -> tuple[str, ...]:
-        """Keys without which a quantity is no number."""
+        """Keys without which a quantity has no values."""
         return next((keys for names, keys in self.only_with if quantity in names), ())
 
     def load(self) -> Any:
-        """The class that computes it, imported now."""
+        """Import the class that computes this kind of map."""
         module, _, name = self.implementation.partition(":")
         return getattr(importlib.import_module(module), name)
 
@@ -411,7 +410,7 @@ MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
 
 
 def quantity_of(kind: object, name: str) -> Quantity:
-    """The row of a quantity, as a kind of map says it."""
+    """The row of a quantity, with the description of a kind of map if it has one."""
     forms = MAP_KINDS[kind].forms if isinstance(kind, str) and kind in MAP_KINDS else ()
     return next((row for form in forms for row in form.rows if row.name == name), EVERY[name])
 
@@ -448,5 +447,5 @@ def registered(kind: MapKind, *quantities: Quantity) -> Iterator[None]:
 
 
 def kinds_with(key: str) -> list[str]:
-    """Kinds that take a key which only some have."""
+    """Kinds that take a key that only some kinds have."""
     return [kind.name for kind in MAP_KINDS.values() if any(key in form.keys for form in kind.forms)]

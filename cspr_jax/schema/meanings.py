@@ -1,4 +1,4 @@
-"""Meanings of whole numbers that stand for words, as far as these depend on what a sweep asks."""
+"""Words for which integers of some quantities stand, as functions of the settings of a sweep."""
 
 import itertools
 from collections.abc import Callable, Mapping
@@ -11,12 +11,12 @@ from cspr_jax.schema.quantities import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Bounds of the acceleration along a straight line, as `families.lines.durations.names_of` names them from 1 on."""
+    """Names of bounds of the acceleration along a line, from 1 on, as in `families.lines.durations.names_of`."""
     robot, limits = settings["robot"], settings.get("limits") or {}
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
     limit_values = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
-    # A smallest tension of zero is left out, since taut cables keep it anyway.
+    # A smallest tension of zero is no further limit, since cables must be taut anyway.
     moving = [name for name, value in limit_values.items() if value is not None and np.any(value)]
     return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
 
@@ -38,7 +38,7 @@ CELL_SIDES = ("not decided", "inside", "outside")
 
 
 def cell_sides(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Sides of a workspace on which a whole cell is proved to lie."""
+    """Sides of a workspace on which a full cell is proved to lie."""
     return CELL_SIDES
 
 
@@ -49,7 +49,7 @@ OPEN_CONDITIONS = (
 
 
 def open_conditions(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Reasons why a cell is open: the boundary, or a condition that is not proved."""
+    """Reasons why a cell is not proved: the boundary, or a condition without a proof."""
     return OPEN_CONDITIONS
 
 
@@ -57,13 +57,13 @@ NEAREST_BODIES = ("none", "two cables", "cable and obstacle", "cable and platfor
 
 
 def nearest_bodies(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Two bodies whose distance is the least of all, in the order of `robots.contacts.clearance.Kind` from 1 on."""
+    """Kinds of the two nearest bodies, in the order of `robots.contacts.clearance.Kind` from 1 on."""
     return NEAREST_BODIES
 
 
-# More words than these nobody reads, nor can HDF5 keep them beside a dataset.
+# Largest number of words: nobody reads more, and HDF5 could not store them as an attribute of a dataset.
 LARGEST_COUNT = 1000
-# By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
+# Functions, by the name in a quantity's row, from the settings of a sweep to words for 0, 1, 2, ...
 MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
     "line-bounds": line_bounds,
     "slack-cables": slack_cables,
@@ -86,6 +86,6 @@ def value_attributes(quantity: Quantity, settings: Mapping[str, Any] | None) -> 
     words = meanings_of(quantity, settings)
     if not words:
         return {}
-    # Words of CF hold letters, digits and underscores, and lie a space apart.
+    # Words of CF consist of letters, digits and underscores, and are separated by spaces.
     meanings = " ".join(word.replace(", ", "_").replace(" ", "_") for word in words)
     return {"flag_values": np.arange(len(words), dtype=quantity.kind), "flag_meanings": meanings}

@@ -1,4 +1,4 @@
-"""Fields of the object that `cspr plan --json` prints, with units and meanings; the reference is written from here."""
+"""Fields of the object that `cspr plan --json` prints, with units and meanings; the reference is made from these."""
 
 from cspr_jax.schema.limits import LIMITS
 
@@ -164,7 +164,7 @@ SEGMENT = {
     "retimed": ("", "Retimed plans: whether the motion is the faster one; the planned one stays where none is proved."),
     "path_deviation": ("m", "Retimed plans: largest distance of the motion from the planned path at samples."),
 }
-# Each section of a path, from stop to stop.
+# Fields of each section of a path, from stop to stop.
 SECTION = {
     "segments": ("1", "Numbers of the segments in which it begins and ends."),
     "length": ("m", "Length of the way of the mass centre."),

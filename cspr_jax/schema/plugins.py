@@ -1,4 +1,4 @@
-"""Rows of other packages, which they offer as entry points; these are read when a name is asked for that no row has."""
+"""Rows that other packages offer as entry points, which are read when a name is looked up that no row has."""
 
 from collections.abc import Callable
 from importlib import metadata
@@ -10,10 +10,10 @@ Row = TypeVar("Row")
 
 
 class ExtensibleRows(dict[str, Row]):
-    """Rows by name, with those of installed packages as soon as they are needed."""
+    """Rows by name, to which rows of installed packages are added when they are needed."""
 
     def __init__(self, rows: dict[str, Row], group: str, add: Callable[[Any], None]) -> None:
-        """Keep the group of entry points, and what adds the object that one of them names."""
+        """Keep the group of entry points, and the function that adds the object of an entry point."""
         super().__init__(rows)
         self._group, self._add, self._is_complete = group, add, False
 
@@ -29,14 +29,14 @@ class ExtensibleRows(dict[str, Row]):
         raise KeyError(name)
 
     def complete(self) -> None:
-        """Add the rows of installed packages, if they are not there yet."""
+        """Add the rows of installed packages, unless they have been added."""
         if self._is_complete:
             return
         errors = []
         for entry in metadata.entry_points(group=self._group):
             try:
                 self._add(entry.load())
-            except Exception as error:  # noqa: BLE001 - code of others may raise anything
+            except Exception as error:  # noqa: BLE001 - code of other packages may raise anything
                 package = entry.dist.name if entry.dist else "unknown"
                 words = f"{entry.name} = {entry.value}: cannot be used: {type(error).__name__}: {error}"
                 errors.append(ConfigError(f"package {package}, entry points {self._group}", words))

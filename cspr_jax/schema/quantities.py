@@ -1,4 +1,4 @@
-"""The one table of everything that a result file can hold: it gives names, units, labels and docs."""
+"""Table of all quantities that result files can contain, with names, units, labels and descriptions."""
 
 import dataclasses
 from collections import ChainMap
@@ -10,7 +10,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
 
-# Narrower types, by the type of today, in which earlier versions stored the same numbers.
+# For some types, narrower ones in which earlier versions stored the same numbers.
 EARLIER = {"uint32": ("uint16",)}
 
 
@@ -20,15 +20,15 @@ class Quantity:
 
     Fields:
         name: name of the dataset.
-        units: as in UDUNITS; "1" for a pure number.
+        units: units in UDUNITS; "1" for a pure number.
         long_name: a short phrase for labels.
         description: one sentence.
         kind: "float" (of the run's dtype) or the NumPy name of an integer type.
-        unflagged: word of pictures where no flag of a verdict is set; empty: it is no verdict.
-        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
-        meanings: row of `schema.meanings.MEANINGS`, if its whole numbers stand for words; empty: they do not.
-        contoured: whether sections of it show where it is a whole number.
-        better: which of two cells' numbers is better; empty: neither.
+        unflagged: word in pictures for a verdict without flags; empty: it is no verdict.
+        signed: whether both signs are equally good, so that zero is in the middle of a picture's colours.
+        meanings: row of `schema.meanings.MEANINGS`, if its integers stand for words; empty: they do not.
+        contoured: whether sections show lines where it is an integer.
+        better: whether smaller or larger numbers are better; empty: neither.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Quantity:
 
     @property
     def readable(self) -> tuple[str, ...]:
-        """NumPy names of the types in which files hold it, its own first."""
+        """NumPy names of the types in which files may store it, its own first."""
         return ("float64", "float32") if self.kind == "float" else (self.kind, *EARLIER.get(self.kind, ()))
 
 
@@ -104,18 +104,18 @@ AXES = {
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
     )
 }
-# Axes that give an orientation together.
+# Axes that together give an orientation.
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
-# Axes without a best point: a motion passes all of its times, and a robot has all of its cables.
+# Axes without a best point: a motion passes all times, and a robot has all cables.
 _NO_CHOICES = ("tau", "cable")
 
 
 def best_name(axis: str) -> str:
-    """The quantity that says which point of an axis is the best one."""
+    """Name of the quantity that holds the best point of an axis."""
     return f"best_{axis}"
 
 
-# A map holds these too once the best point of an axis is chosen for each cell of the other axes; no file has them.
+# Quantities of maps in which the best point of an axis was chosen for each cell of the other axes; no file has them.
 BEST = {
     q.name: q
     for q in (
@@ -131,7 +131,7 @@ BEST = {
     )
 }
 
-# These texts say what verdicts rest on, and what the margin is.
+# Parts of descriptions: what verdicts rest on, and what the margin is.
 HOW = " (proved)"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
@@ -143,7 +143,7 @@ _BOUNDED = (
     "As its proof bounds it: the smallest itself may be less by 0.2 %, near zero by 0.02 % of what is usual along the "
     "motion."
 )
-# Units of margins by their numbers in motion files.
+# Units of margins, by the index in motion files.
 MARGIN_UNITS = ("1", "N", "m/s^2")
 TRAJECTORY = {
     q.name: q
@@ -216,7 +216,7 @@ TRAJECTORY = {
         ),
     )
 }
-# A motion file holds these for each segment of its plan, and `TRAJECTORY` for each of its rows over time.
+# Quantities of motion files for each segment of the plan; `TRAJECTORY` has those for each row over time.
 SEGMENTS = {
     q.name: q
     for q in (
@@ -261,7 +261,7 @@ SEGMENTS = {
         Quantity("segment_allowed", "1", "allowed", "Largest, or smallest, value that is allowed, in the same unit."),
     )
 }
-# A motion file holds these for an object that the plan releases; the dimensions of each follow.
+# Quantities of motion files for an object that the plan releases, with their dimensions.
 FLIGHT = {
     q.name: q
     for q in (
@@ -277,7 +277,7 @@ FLIGHT = {
         ),
     )
 }
-# A motion file holds these where the intervals are known in which its motion fails.
+# Quantities of motion files for the intervals in which the motion fails, where these are known.
 FAILURES = {
     q.name: q
     for q in (
@@ -299,7 +299,7 @@ FAILURES = {
         Quantity("criterion_flag", "1", "criterion that fails", "Verdict flag of the criterion.", "uint32"),
     )
 }
-# A motion file holds these for the nodes of the grids on which the least time along paths was sought.
+# Quantities of motion files for the nodes of the grids on which least times along paths were computed.
 PATHS = {
     q.name: q
     for q in (
@@ -337,7 +337,7 @@ PATHS = {
         ),
     )
 }
-# Dimensions of what a file holds beside rows and segments.
+# Dimensions of quantities that belong neither to rows nor to segments.
 OTHER_DIMS = {
     **dict.fromkeys(PATHS, ("path_node",)),
     "path_speed": ("path_node", "speed"),
@@ -352,7 +352,7 @@ OTHER_DIMS = {
     "throw": ("throw",),
     "landing": ("throw", "level"),
 }
-# Second dimensions of the quantities over time, and the parts along them.
+# Second dimensions of quantities over time, and names of the parts along them.
 ACROSS = {
     **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot", "mass_centre"), "axis"),
     "quaternion": "component",
@@ -371,7 +371,7 @@ PARTS = {
     "edge": ("start", "end"),
     "speed": ("least", "largest", "actual", "allowed"),
 }
-# Maps of poses have this row in place of the verdict of motions.
+# Maps of poses have this row instead of the verdict of motions.
 POSE_VERDICT = Quantity(
     "verdict",
     "1",
@@ -380,7 +380,7 @@ POSE_VERDICT = Quantity(
     "uint32",
     unflagged="inside",
 )
-# Maps of ellipses have these rows in place of those of motions between poses.
+# Maps of ellipses have these rows instead of those of motions between poses.
 OF_ELLIPSES = (
     Quantity(
         "verdict",
@@ -407,7 +407,7 @@ OF_ELLIPSES = (
         f"size, speeds and accelerations over what is allowed; NaN where only formulas are used. {_BOUNDED}",
     ),
 )
-# Maps of lines and paths have these rows in place of those of arcs and of ellipses.
+# Maps of lines and paths have these rows instead of those of arcs and of ellipses.
 OF_PATHS = (
     Quantity(
         "duration",
@@ -435,7 +435,7 @@ OF_PATHS = (
         better="larger",
     ),
 )
-# Maps of motions among obstacles have this row in place of the clearance of poses.
+# Maps of motions among obstacles have this row instead of the clearance of poses.
 MOTION_CLEARANCE = Quantity(
     "clearance",
     "m",
@@ -445,7 +445,7 @@ MOTION_CLEARANCE = Quantity(
     signed=True,
     better="larger",
 )
-# Why accessible orientations are not attained, by the best candidate's flags.
+# Reasons why accessible orientations are not attained, by flags of the best candidate.
 REFUSALS = {
     "refused_slack": Verdict.SLACK_CABLE,
     "refused_singular": Verdict.SINGULAR,
@@ -978,21 +978,21 @@ QUANTITIES = {
         ),
     )
 }
-# A picture of two maps shows this.
+# Quantity of pictures of the ratio of two maps.
 RATIO = Quantity("ratio", "1", "ratio", "A quantity of one map over that of another, as `cspr plot --ratio` shows it.")
 EVERY = ChainMap(AXES, QUANTITIES, BEST, {RATIO.name: RATIO}, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
 _OWN = frozenset(QUANTITIES)
 
 
 def columns_of(name: str, count: int) -> list[str]:
-    """Columns of a quantity of a motion in a CSV file."""
+    """Names of the columns of a motion's quantity in a CSV file."""
     if name not in ACROSS:
         return [name]
     return [f"{name}_{part}" for part in PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)])]
 
 
 def register(quantity: Quantity) -> None:
-    """Add a quantity that maps can give, from outside of the package; a second time changes nothing."""
+    """Add a quantity of maps from outside of the package; adding it again changes nothing."""
     present = EVERY.get(quantity.name, quantity)
     if present != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
@@ -1000,7 +1000,7 @@ def register(quantity: Quantity) -> None:
 
 
 def from_outside() -> list[Quantity]:
-    """Quantities from outside of the package, which another process does not know."""
+    """Quantities from outside of the package, of which other processes must be told."""
     return [quantity for name, quantity in QUANTITIES.items() if name not in _OWN]
 
 

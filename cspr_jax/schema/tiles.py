@@ -1,4 +1,4 @@
-"""Tiles of a grid: blocks of one shape, computed one at a time."""
+"""Tiles of a grid: blocks of equal shape that are computed one at a time."""
 
 import dataclasses
 import math
@@ -11,13 +11,13 @@ LARGEST_TILE = 65536
 
 
 class CellCost(NamedTuple):
-    """Time that a cell of a kind of map takes on one core; measured once, within a factor of three.
+    """Time that a cell of a kind of map takes on one core, measured once to within a factor of three.
 
     Fields:
-        seconds: without limits, and with 30 arcs.
-        orientation: further seconds for each orientation of a position's set.
-        limits: cost of limits, over the costs that `sweep.tile_sizes` has.
-        uncertainty: cost of an uncertainty, likewise.
+        seconds: time without limits, and with 30 arcs, s.
+        orientation: additional time for each orientation at a position, s.
+        limits: factor on the costs of limits in `sweep.tile_sizes`.
+        uncertainty: factor on the cost of an uncertainty there.
     """
 
     seconds: float = 1e-5
@@ -30,7 +30,7 @@ ORDINARY_COST = CellCost()
 
 
 def tile_shape(shape: tuple[int, ...], maximum: int = LARGEST_TILE) -> tuple[int, ...]:
-    """Shape of the tiles of a grid: whole trailing axes as long as they fit, and equal parts of the next one."""
+    """Shape of the tiles of a grid: as many full trailing axes as fit, and equal parts of the next axis."""
     tile, capacity = [], maximum
     for length in reversed(shape):
         parts = -(-length // max(capacity, 1))
@@ -41,10 +41,10 @@ def tile_shape(shape: tuple[int, ...], maximum: int = LARGEST_TILE) -> tuple[int
 
 @dataclasses.dataclass(frozen=True)
 class Tiling:
-    """Tiles that cover a grid, in order, the last axis fastest; those at the border may be smaller.
+    """Tiles that cover a grid, in order, with the last axis fastest; tiles at the border may be smaller.
 
     Fields:
-        shape: of the grid.
+        shape: shape of the grid.
         tile: shape of a tile.
     """
 
@@ -77,7 +77,7 @@ class Grid:
     """The product of named axes.
 
     Fields:
-        axes: coordinates, in the order of the dimensions.
+        axes: coordinates of each axis, in the order of the dimensions.
         tile: shape of a tile.
     """
 
@@ -96,7 +96,7 @@ class Grid:
 
     @property
     def tiling(self) -> Tiling:
-        """Its tiles."""
+        """Tiles of the grid."""
         return Tiling(self.shape, self.tile)
 
     def cells(self, slices: tuple[slice, ...]) -> dict[str, np.ndarray]:

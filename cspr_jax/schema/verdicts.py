@@ -1,4 +1,4 @@
-"""Verdicts: bit flags, each with a sentence, and what criteria bound. No jax here: files and tables use them too."""
+"""Verdicts: bit flags, each with a sentence, and the quantities that criteria bound. No jax: files use them too."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 
-# Arrays of flags have this type, in memory and in files.
+# Type of arrays of flags, in memory and in files.
 FLAGS = np.uint32
 
 
 class Verdict(enum.IntFlag):
-    """Flags of the reasons why a trajectory is not, or not certainly, feasible; 0 is feasible."""
+    """Flags of the reasons why a motion is not feasible, or not proved feasible; 0 is feasible."""
 
     FEASIBLE = 0
     SLACK_CABLE = 1
@@ -41,13 +41,13 @@ class Verdict(enum.IntFlag):
 
     @property
     def text(self) -> str:
-        """The flags' names joined by "+"; "feasible" without any."""
+        """Names of the flags, joined by "+"; "feasible" without flags."""
         return "+".join(flag.name.lower() for flag in type(self) if flag & self and flag.name) or "feasible"
 
 
-# Flags that do not name the criterion that is broken.
+# Flags that do not name a criterion that fails.
 NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
-# Answers that are not proved, or not proved to be the smallest ones.
+# Flags of answers that are not proved, or not proved to have the smallest number of arcs.
 NOT_PROVED = FLAGS(Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value)
 # Flags that leave a verdict open.
 OPEN = Verdict.UNDECIDED | Verdict.NOT_FINITE
@@ -80,9 +80,9 @@ class CriterionRow(NamedTuple):
     """Quantity that a criterion bounds, in JSON and in words.
 
     Fields:
-        key: in JSON, below `demands`.
-        words: in text, and as `words` in JSON.
-        unit: of both; "1" of ratios.
+        key: key in JSON, below `demands`.
+        words: words in text, and as `words` in JSON.
+        unit: unit; "1" for ratios.
     """
 
     key: str
@@ -110,7 +110,7 @@ CRITERIA = {
 
 
 def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> str:
-    """Name the quantity that a criterion bounds."""
+    """Words for the quantity that a criterion bounds."""
     row = CRITERIA.get(flag)
     words = row.words if row is not None else flag.text.replace("_", " ")
     if cable is not None:
@@ -119,6 +119,6 @@ def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> 
 
 
 def conjunction(flags: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """Verdict of several conditions that must all be met: a broken one decides, whatever the others leave open."""
+    """Verdict of several conditions that must all be met: if one fails, others that are undecided do not matter."""
     refuted = flags & ~flags.dtype.type(OPEN.value)
     return np.where(refuted != 0, refuted, flags)

@@ -1,1 +1,1 @@
-"""Files of a run: how they reach the disk, what each holds, and how each is checked."""
+"""Files of a run: their safe writing, their content, and their checks."""

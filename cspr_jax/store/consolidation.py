@@ -1,4 +1,4 @@
-"""The result of a run: a copy of its shards in one file, checked again after it was written."""
+"""The result of a run: a copy of all shards in one file, which is checked after it was written."""
 
 import dataclasses
 import hashlib
@@ -29,16 +29,16 @@ LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_00
 
 @dataclasses.dataclass(frozen=True)
 class Content:
-    """Content of a result, as found by reading all of it.
+    """Summary of a result that was read completely.
 
     Fields:
-        identity: of the sweep.
-        settings: of the sweep.
-        cells: their number.
-        tiles: their number.
-        near_zero: cells whose margin lies within 1e-9 of zero.
+        identity: identity of the sweep.
+        settings: settings of the sweep.
+        cells: number of cells.
+        tiles: number of tiles.
+        near_zero: number of cells whose margin is within 1e-9 of zero.
         mixed: whether its shards come from different environments.
-        proved: part of the cells whose answer is proved; None: not said.
+        proved: fraction of the cells whose answer is proved; None: unknown.
     """
 
     identity: str
@@ -60,7 +60,7 @@ def consolidate(
     *,
     between: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write the result, read it back, and give it its name."""
+    """Write the result, read it back, and only then give it its name."""
     digests, environments, near_zero, undecided = [], set(), 0, []
     with new_file(disk, path) as descriptor:
         with open_hdf5(disk, descriptor, attributes) as file:
@@ -85,7 +85,7 @@ def consolidate(
 
 
 def _proved(undecided: list[int | None], cells: int) -> dict[str, float]:
-    # The part of the cells whose answer is proved, where every shard says it.
+    # Fraction of the cells whose answer is proved, if every shard has that number.
     counts = [count for count in undecided if count is not None]
     return {"proved": 1.0 - sum(counts) / cells} if len(counts) == len(undecided) else {}
 
@@ -103,7 +103,7 @@ def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[]
 
 
 def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None) -> Content:
-    """Content of a result, all of it read and compared with its checksums, but for its trailer."""
+    """Read a result completely and compare it with its checksums, except its trailer."""
     try:
         with h5py.File(path, "r") as file:
             settings = plain_json(_text(file, "settings"))
@@ -134,7 +134,7 @@ def _text(file: h5py.File, name: str) -> str:
 
 
 def _stored_datasets(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
-    # Open all datasets that the settings name, and no others; each is checked before anything is read.
+    # Open only the datasets that the settings name; each is checked before its values are read.
     names = [*axes, *store]
     if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():
         raise DamagedError("its settings name other quantities than cspr has")

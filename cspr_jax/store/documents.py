@@ -1,7 +1,7 @@
-"""JSON that a run directory holds: its record, the lines of its log, the headers of its shards; one schema for all.
+"""JSON in a run directory: its record, the lines of its log, the headers of its shards; one schema for all.
 
-Anybody can write a text with a right checksum. What is read here is of known types and sizes, so that no
-user has to check it again.
+Anybody can write a text with a matching checksum. This module checks types and sizes, so that code that uses documents
+need not check them again.
 """
 
 import json
@@ -21,7 +21,7 @@ from cspr_jax.store.files.disk import READ_ONLY, Disk
 from cspr_jax.store.files.guard import LARGEST_CHUNKS, LARGEST_RANK
 from cspr_jax.store.files.publishing import publish
 
-# Settings nest some six deep; functions that walk through them may be recursive.
+# Largest depth of nesting: settings have some six levels, and recursive functions walk through them.
 DEEPEST = 32
 LONGEST_NAME = 255
 LARGEST_RECORD = 64 << 20
@@ -32,13 +32,13 @@ AnyDocument = TypeVar("AnyDocument", bound="Document")
 
 
 class Document(BaseModel):
-    """A JSON object: keys of known types, numbers finite; keys that a later version adds are passed over."""
+    """A JSON object with checked types and finite numbers; unknown keys, such as of later versions, are ignored."""
 
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True, allow_inf_nan=False)
 
 
 def _text(value: Any) -> str:
-    # pydantic's own type refuses names of files that are not UTF-8.
+    # pydantic's own type would refuse names of files that are not UTF-8.
     if not isinstance(value, str):
         raise ValueError("must be a text")
     return value
@@ -61,11 +61,11 @@ class Header(Document):
     """Header of a shard.
 
     Fields:
-        identity: of the sweep.
+        identity: identity of the sweep.
         tile: index of the tile.
         environment: hash of the environment that computed it.
-        near_zero: cells whose margin lies within 1e-9 of zero.
-        undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
+        near_zero: number of cells whose margin is within 1e-9 of zero.
+        undecided: number of cells whose answer is not proved; None: the map proves nothing, or the file is older.
     """
 
     identity: Digest
@@ -76,11 +76,11 @@ class Header(Document):
 
 
 class Entry(Document):
-    """A line of the log; it may say more.
+    """A line of the log, which may have further keys.
 
     Fields:
-        time: of the wall clock.
-        event: what happened.
+        time: time of the wall clock.
+        event: kind of the event.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -104,12 +104,12 @@ class _Run(Document):
 
 
 class Settings(Document):
-    """The part of resolved settings that says how a run is laid out.
+    """The part of resolved settings that determines the layout of a run.
 
     Fields:
-        axes: those of the sweep file, each a list or a range with a count.
+        axes: axes of the sweep file, each a list or a range with a count.
         dimensions: names of all axes in the order of the result.
-        orientations: of a map over all of them, whose axes follow from their divisions.
+        orientations: settings of a map over all orientations, whose axes follow from divisions.
         run: shape of a tile, names of the quantities, and their type.
     """
 
@@ -140,11 +140,11 @@ class Settings(Document):
 
 
 class Source(Document):
-    """Origin of a run; no decision uses it.
+    """Origin of a run, for information only.
 
     Fields:
         file: name of the sweep file.
-        text: of the sweep file.
+        text: text of the sweep file.
         command: words of the command.
     """
 
@@ -157,10 +157,10 @@ class Record(Document):
     """Content of run.json, without its checksum.
 
     Fields:
-        identity: of the sweep.
-        settings: resolved, of which the identity is the hash.
-        environment: of the computation.
-        source: name and text of the sweep file, and the command; no decision uses them.
+        identity: identity of the sweep, the hash of its settings.
+        settings: resolved settings.
+        environment: environment of the computation.
+        source: name and text of the sweep file, and the command, for information only.
     """
 
     identity: Digest
@@ -188,7 +188,7 @@ class Record(Document):
 
 
 def plain_json(text: str | bytes) -> Any:
-    """JSON of finite numbers that is not nested deeply."""
+    """Parse JSON, and refuse infinite numbers and deep nesting."""
     try:
         value = json.loads(text, parse_constant=_not_finite, parse_float=_finite)
     except RecursionError as error:
@@ -205,7 +205,7 @@ def plain_json(text: str | bytes) -> Any:
 
 
 def document(kind: type[AnyDocument], value: Any, what: str) -> AnyDocument:
-    """Document that JSON holds, checked against its schema."""
+    """Check parsed JSON against the schema of a document."""
     try:
         return kind.model_validate(value)
     except ValidationError as error:
@@ -215,7 +215,7 @@ def document(kind: type[AnyDocument], value: Any, what: str) -> AnyDocument:
 
 
 def write_record(disk: Disk, path: Path, record: Record) -> None:
-    """Write run.json: what a run directory belongs to, once, with a checksum of its own."""
+    """Write run.json, which says to what sweep a run directory belongs, with a checksum."""
     content = record.model_dump()
     text = json.dumps({**content, "checksum": digest(content)}, indent=1, allow_nan=False)
     publish(disk, path, (text + "\n").encode(), mode=READ_ONLY)

@@ -17,7 +17,7 @@ from cspr_jax.store.files.disk import Disk, check_plain, open_plain
 from cspr_jax.store.files.publishing import PART, make_folders, refusal
 
 _SHARD = re.compile(r"(\d{5,})\.h5")
-# A lock names its holder; it is empty when it is new.
+# Content of a lock, which names its holder; a new one is empty.
 _HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
 _NO_LOCKS = (
     "network disks and FUSE may have no locks: choose -o on another disk; other programs read a result that is copied "
@@ -26,14 +26,14 @@ _NO_LOCKS = (
 
 
 class RunFolder:
-    """Names and upkeep of a run directory.
+    """Names, lock and cleaning of a run directory.
 
     Args:
-        name: of the sweep; its result is `name`.h5.
+        name: name of the sweep; its result is `name`.h5.
     """
 
     def __init__(self, path: Path, name: str, disk: Disk) -> None:
-        """Nothing is touched yet."""
+        """Keep the names, without any access to the disk."""
         self.path, self.disk = path, disk
         self.result = path / f"{name}.h5"
         self.record = path / "run.json"
@@ -48,17 +48,17 @@ class RunFolder:
         return self.shards / f"{index:05d}.h5"
 
     def shard_names(self) -> dict[Path, int]:
-        """Names of shards that are present; other names in their folder are ignored."""
+        """Paths of the shards that exist, with the indices of their tiles; other files are ignored."""
         matches = {path: _SHARD.fullmatch(path.name) for path in sorted(self.shards.glob("*"))}
         return {path: int(match[1]) for path, match in matches.items() if match}
 
     def make(self) -> None:
-        """Make the directory; its parents too."""
+        """Make the directory and its parents."""
         make_folders(self.disk, self.path)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the lock of the directory; it is free as soon as its holder dies."""
+        """Hold the lock of the directory, which becomes free as soon as its holder dies."""
         path = self.lock
         try:
             check_plain(self.log)
@@ -79,7 +79,7 @@ class RunFolder:
                 raise StoreError(printable(f"{path}: cannot be locked: {error.strerror}: {_NO_LOCKS}")) from error
             if not _HOLDER.fullmatch(os.pread(file, 400, 0)):
                 raise RefusedError(f"{path}: is somebody's file, not a lock of cspr: choose another -o")
-            with contextlib.suppress(OSError):  # it only serves error messages of other processes
+            with contextlib.suppress(OSError):  # this only serves error messages of other processes
                 os.ftruncate(file, 0)
                 os.pwrite(file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
             self._held = os.fstat(file)
@@ -90,7 +90,7 @@ class RunFolder:
             os.close(file)
 
     def is_held(self) -> bool | None:
-        """Tell whether a process holds the lock at the moment; nothing is written."""
+        """Tell whether a process holds the lock, without writing anything."""
         try:
             file = os.open(self.lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY)
         except FileNotFoundError:
@@ -116,7 +116,7 @@ class RunFolder:
             there = os.lstat(self.lock)
         except FileNotFoundError:
             if not self.path.is_dir():
-                return  # nothing can be written either
+                return  # then nothing can be written there either
             there = None
         except OSError as error:
             raise refusal(self.lock, error) from error
@@ -126,13 +126,13 @@ class RunFolder:
             )
 
     def leftovers(self) -> list[Path]:
-        """Files that processes have begun to write and not finished."""
+        """Files that processes began to write and did not finish."""
         pattern = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
         return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
     def remove_leftovers(self) -> None:
-        """Remove what dead processes left unfinished; only under the lock."""
+        """Remove files that dead processes left unfinished; the caller must hold the lock."""
         self.check_held()
         for part in self.leftovers():
             try:
@@ -141,7 +141,7 @@ class RunFolder:
                 raise refusal(part, error) from error
 
     def set_aside(self, path: Path) -> Path:
-        """Move something damaged into quarantine/; nothing there is ever deleted by the program."""
+        """Move a damaged file into quarantine/, where the program never deletes anything."""
         self.check_held()
         make_folders(self.disk, self.quarantine)
         number = 0
@@ -156,7 +156,7 @@ class RunFolder:
         return target
 
     def note(self, event: str, **fields: Any) -> None:
-        """Add a line to log.jsonl, which no decision ever reads."""
+        """Add a line to log.jsonl, which is for information only."""
         time_stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
         seconds = round(time.time(), 3)
         line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), "seconds": seconds, **fields})
@@ -167,7 +167,7 @@ class RunFolder:
 
 
 def _lock(file: int) -> None:
-    # Whoever asks whether somebody runs holds the lock for a moment.
+    # Try again: a process that only tests the lock holds it for a moment.
     for _ in range(5):
         with contextlib.suppress(BlockingIOError):
             return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""Shards: the file of one tile, immutable once it has its name. HDF5, with a checksum trailer."""
+"""Shards: HDF5 files of one tile each, with a checksum trailer, which never change once they have their names."""
 
 import dataclasses
 import hashlib
@@ -28,9 +28,9 @@ class Layout:
     """Layout that the shards of a run share.
 
     Fields:
-        identity: of the sweep.
+        identity: identity of the sweep.
         store: names of the quantities.
-        dtype: of quantities of kind "float".
+        dtype: type of quantities of kind "float".
     """
 
     identity: str
@@ -43,11 +43,11 @@ class Shard:
     """The content of a shard.
 
     Fields:
-        index: of the tile.
+        index: index of the tile.
         environment: hash of the environment that computed it.
-        near_zero: cells whose margin lies within 1e-9 of zero.
-        values: (n_1, ..., n_k) for each stored quantity.
-        undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
+        near_zero: number of cells whose margin is within 1e-9 of zero.
+        values: array (n_1, ..., n_k) of each stored quantity.
+        undecided: number of cells whose answer is not proved; None: the map proves nothing, or the file is older.
     """
 
     index: int
@@ -63,7 +63,7 @@ class Shard:
 
 
 def digest_of(values: dict[str, np.ndarray]) -> str:
-    """SHA-256 over name, type, shape and bytes of arrays, sorted by name."""
+    """SHA-256 of name, type, shape and bytes of arrays, sorted by name."""
     total = hashlib.sha256()
     for name in sorted(values):
         array = np.ascontiguousarray(values[name])
@@ -96,7 +96,7 @@ def decode(
     shape: tuple[int, ...],
     begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None,
 ) -> Shard:
-    """A shard, checked in every respect but its trailer."""
+    """Decode a shard and check it completely, except its trailer."""
     kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
     try:
         with h5py.File(source, "r") as file:
@@ -117,7 +117,7 @@ def decode(
             written = file.attrs["content_sha256"]
     except UNREADABLE as error:
         raise DamagedError(printable(f"HDF5 cannot read it: {reason(error)}")) from error
-    # The digest is taken of the values in the types in which they were written.
+    # The digest refers to the types in which the values were written.
     if not isinstance(written, str) or digest_of(values) != written:
         raise DamagedError("its content has changed")
     if max(header.near_zero, header.undecided or 0) > math.prod(shape):

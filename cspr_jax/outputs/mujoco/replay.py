@@ -49,8 +49,8 @@ class PlayedPlan:
         through: the same with all segments in succession, from the start of the plan.
         tension: (n, n_cables) planned tensions, N; for parallel pairs, of all six cables.
         tension_deviation: (n, n_cables) change of these tensions, with the least sum of squares, that makes them supply
-            the wrench of MuJoCo's inverse dynamics along the plan's path, N; on as many cables as degrees of freedom, the
-            difference of the two programs' tensions.
+            the wrench of MuJoCo's inverse dynamics along the plan's path, N; on as many cables as degrees of freedom it
+            is the difference of the two programs' tensions.
     """
 
     robot: str

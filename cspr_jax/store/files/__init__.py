@@ -1,1 +1,1 @@
-"""Files on a disk: complete or absent, with checksums, in netCDF-4 layout."""
+"""Files that are complete or absent, with checksums, in netCDF-4 layout."""

@@ -1,7 +1,7 @@
-"""A line behind the last byte of a file that holds the SHA-256 of all before it.
+"""Checksum trailer: a line at the end of a file with the SHA-256 of all bytes before it.
 
-HDF5 and netCDF take no notice of it. It is checked before HDF5 reads a file: a damaged one can
-give wrong values without an error, or keep the library busy for ever.
+HDF5 and netCDF ignore it. It is checked before HDF5 reads a file, since a damaged file can give wrong values without an
+error, or keep the library busy for ever.
 """
 
 import errno
@@ -19,13 +19,13 @@ _STEP = 1 << 20
 NO_TRAILER = "it is not whole, or not of cspr"
 
 
-# These errors mean that nothing is there, or that it is no file. Every other refusal comes from the system or the disk,
-# and says nothing about the file.
+# Errors that mean that there is no such file. All others come from the system or the disk, and do not mean that the
+# file is missing or damaged.
 _NO_FILE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.ENAMETOOLONG}
 
 
 class DamagedError(Exception):
-    """A file that is not what was written."""
+    """A file that differs from what was written."""
 
 
 def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
@@ -52,9 +52,9 @@ def write_trailer(disk: Disk, file: int, length: int) -> None:
 
 
 def open_regular(path: Path, *, follow: bool = True) -> int:
-    """Open a file for reading, and only a file: a pipe would keep its reader waiting."""
+    """Open a regular file for reading; others are refused, since a pipe would keep its reader waiting."""
     try:
-        # Opening a device can do something to it, so its kind is checked before, and again against a change between.
+        # Check the kind before opening, which may have effects on a device, and again afterwards.
         if not stat.S_ISREG(os.stat(path, follow_symlinks=follow).st_mode):
             raise DamagedError("it is not a file")
         how = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY | (0 if follow else os.O_NOFOLLOW)
@@ -70,7 +70,7 @@ def open_regular(path: Path, *, follow: bool = True) -> int:
 
 
 def read_regular(path: Path, maximum: int, *, last: bool = False) -> bytes:
-    """Content of a file of a run directory, which is no link."""
+    """Content of a regular file of a run directory; links are refused."""
     file = open_regular(path, follow=False)
     try:
         length = os.fstat(file).st_size
@@ -84,7 +84,7 @@ def read_regular(path: Path, maximum: int, *, last: bool = False) -> bytes:
 
 
 def has_trailer(path: Path, file: int) -> bool:
-    """Tell whether an open file ends with a checksum trailer; files of others need not be read completely."""
+    """Tell whether an open file ends with a checksum trailer, without reading all of it."""
     try:
         line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
     except OSError as error:
@@ -93,7 +93,7 @@ def has_trailer(path: Path, file: int) -> bool:
 
 
 def check_open(path: Path, file: int) -> bytes:
-    """Compare an open file with its checksum trailer."""
+    """Compare an open file with its checksum trailer, and return the trailer."""
     try:
         length = os.fstat(file).st_size - LENGTH
         line = os.pread(file, LENGTH, max(length, 0))

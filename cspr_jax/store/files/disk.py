@@ -1,4 +1,4 @@
-"""Everything that changes a disk, one system call a method: tests put a failing disk in its place."""
+"""All calls that change a disk, one system call for each method, so that tests can replace them by failing ones."""
 
 import errno
 import os
@@ -10,7 +10,7 @@ USUAL = 0o644
 
 
 class Disk:
-    """The calls that change a disk."""
+    """Calls that change a disk."""
 
     def create(self, path: Path, mode: int = USUAL) -> int:
         """Make a file, and open it for writing and reading."""
@@ -29,7 +29,7 @@ class Disk:
         os.fsync(file)
 
     def replace(self, part: Path, path: Path) -> None:
-        """Rename a file, over another if there is one."""
+        """Rename a file, replacing another if there is one."""
         os.replace(part, path)
 
     def sync_folder(self, path: Path) -> None:
@@ -45,11 +45,11 @@ class Disk:
         os.unlink(path)
 
     def make_folder(self, path: Path) -> None:
-        """Make a folder whose parent is there."""
+        """Make a folder in an existing one."""
         os.mkdir(path)
 
     def append(self, path: Path, data: bytes) -> None:
-        """Add to the end of a plain file; it is made if absent."""
+        """Append to a regular file, which is made if it is absent."""
         file = open_plain(path, os.O_WRONLY | os.O_APPEND)
         try:
             os.write(file, data)
@@ -58,8 +58,8 @@ class Disk:
 
 
 def open_plain(path: Path, how: int) -> int:
-    """Open a file for writing that has no other name, or make it."""
-    check_plain(path)  # opening a device can do something to it; checked again against a change between
+    """Open for writing, or make, a regular file that has no other name."""
+    check_plain(path)  # before opening, which may have effects on a device; checked again afterwards
     file = os.open(path, how | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY, USUAL)
     try:
         _check_plain(os.fstat(file))
@@ -70,7 +70,7 @@ def open_plain(path: Path, how: int) -> int:
 
 
 def check_plain(path: Path) -> None:
-    """Refuse what `open_plain` refuses, without opening it; a name that is free will do."""
+    """Refuse a file that `open_plain` would refuse, without opening it; a name without a file is accepted."""
     if os.path.lexists(path):
         _check_plain(os.lstat(path))
 

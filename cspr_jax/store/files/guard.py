@@ -1,8 +1,8 @@
-"""Guarded reading of HDF5 files that anybody may have made: plain numbers and short texts, in one file, of known sizes.
+"""Guarded reading of HDF5 files of unknown origin: only numbers and short texts of limited size, within the file.
 
-Anybody can write a checksum that fits. HDF5 follows links into other files (a pipe keeps it waiting for ever), unpacks
-any amount of memory from a few bytes, and builds whatever type a file describes. So every object is asked
-for by its name, and its link, layout, filters, type and size are checked, in this order, before it is read.
+Anybody can write a matching checksum. HDF5 follows links into other files (a pipe keeps it waiting for ever), unpacks
+any amount of memory from a few bytes, and builds any type that a file describes. So every object is looked up by its
+name, and its link, layout, filters, type and size are checked, in this order, before it is read.
 """
 
 import math
@@ -15,17 +15,17 @@ from h5py import h5a, h5d, h5g, h5l, h5o, h5s, h5t, h5z
 
 from cspr_jax.store.files.checksum import DamagedError
 
-LARGEST_CHUNKS = 100_000  # a map has at most so many tiles, each of which is a chunk
+LARGEST_CHUNKS = 100_000  # largest number of tiles of a map, each of which is a chunk
 LARGEST_CHUNK = 1 << 24  # bytes
-# Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
+# Bytes: settings contain a sweep file and a robot file of up to 1 MB each as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16
-LARGEST_ROWS = 1000  # of an attribute with a row for each cable
-# Deflate packs at most 1032 bytes into one.
+LARGEST_ROWS = 1000  # largest number of rows of an attribute with a row for each cable
+# Largest ratio of compression: Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
 _PER_CHUNK = 256
-# A dataset gets these attributes from this program and from HDF5's dimension scales.
+# Attributes of datasets that this program writes, and those of HDF5's dimension scales.
 _ATTRIBUTES = (
     *("units", "long_name", "description", "flag_masks", "flag_values", "flag_meanings"),
     *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
@@ -49,9 +49,9 @@ class ReadableDataset(NamedTuple):
     Fields:
         data: the open dataset.
         shape: its shape.
-        dtype: of NumPy.
+        dtype: name of its type in NumPy.
         memory_bytes: size in memory.
-        chunks: their number.
+        chunks: number of chunks.
         file_bytes: size in the file.
     """
 
@@ -71,12 +71,12 @@ class ReadableDataset(NamedTuple):
 
 
 def datasets(file: h5py.File, names: Iterable[str], *, is_joined: bool = False) -> dict[str, ReadableDataset]:
-    """Open the named datasets that a file holds; nothing else of the file is inspected."""
+    """Open those of the named datasets that a file contains, without inspecting anything else."""
     return {name: _dataset(file, name, is_joined) for name in names if file.id.links.exists(name.encode())}
 
 
 def refuse_dense(datasets: Iterable[ReadableDataset], file_bytes: int, *, densest: int = DENSEST) -> None:
-    """Refuse datasets that hold much more than their file can, or much less than it has."""
+    """Refuse datasets that claim much more, or much less, than the size of their file explains."""
     readable = list(datasets)
     total, maximum = sum(one.memory_bytes for one in readable), _PLENTY + densest * file_bytes
     if total > maximum:
@@ -89,7 +89,7 @@ def refuse_dense(datasets: Iterable[ReadableDataset], file_bytes: int, *, denses
 
 
 def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
-    """Refuse a file with other objects or attributes than the requested ones."""
+    """Refuse a file with more objects or attributes than those requested."""
     there = h5g.open(file.id, b"/").get_num_objs(), h5a.get_num_attrs(file.id)
     if there != (objects, attributes):
         raise DamagedError(
@@ -98,7 +98,7 @@ def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
 
 
 def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str | None:
-    """An attribute that is one text, of variable length or, in files of earlier versions, of a fixed one."""
+    """An attribute that is one text, of variable length or, in files of earlier versions, of fixed length."""
     if not h5a.exists(item.id, name.encode()):
         return None
     attribute = h5a.open(item.id, name.encode())
@@ -106,7 +106,7 @@ def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str 
     if attribute.get_space().get_simple_extent_type() != h5s.SCALAR or kind.get_class() != h5t.STRING:
         raise DamagedError(f"its {name} must be one text")
     is_variable = kind.is_variable_str()
-    # The length of a text of variable length is known only once it has been read, within the limits of this process.
+    # The length of such a text is known only after reading it, within the memory limit of this process.
     data = item.attrs[name].encode("utf-8", "surrogateescape") if is_variable else b""
     length = len(data) if is_variable else kind.get_size()
     if length > largest:
@@ -128,7 +128,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     attribute = h5a.open(item.id, name.encode())
     space = attribute.get_space()
     extent = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
-    extent = () if extent == (1,) and not shape else extent  # netCDF has lists of one number
+    extent = () if extent == (1,) and not shape else extent  # netCDF writes numbers as lists of one
     fits = len(extent) == len(shape) and space.get_simple_extent_type() != h5s.NULL
     fits = fits and all(1 <= n <= LARGEST_ROWS if m is None else n == m for n, m in zip(extent, shape, strict=True))
     if not fits or _dtype(attribute.get_type()) != dtype:
@@ -149,7 +149,7 @@ def _dataset(file: h5py.File, name: str, is_joined: bool) -> ReadableDataset:
     if any(h5a.exists(data, one.encode()) for one in _SCALING) or (not is_joined and h5a.get_num_attrs(data) > count):
         raise DamagedError(f"{name} has attributes that are none of cspr")
     creation = data.get_create_plist()
-    # Asked before the dataspace: HDF5 opens the other files of a virtual dataset to find its shape.
+    # Check the layout before the dataspace, for which HDF5 would open the other files of a virtual dataset.
     if creation.get_layout() not in (h5d.COMPACT, h5d.CONTIGUOUS, h5d.CHUNKED) or creation.get_external_count():
         raise DamagedError(f"{name}: its data lie in other files: must be in this one")
     filters = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
@@ -169,5 +169,5 @@ def _dataset(file: h5py.File, name: str, is_joined: bool) -> ReadableDataset:
 
 
 def _dtype(kind: h5t.TypeID) -> str | None:
-    # Nothing is built of a type before it is known to be one of these.
+    # Compare a type with these before anything is built from it.
     return next((name for name, types in _TYPES.items() if any(kind.equal(one) for one in types)), None)

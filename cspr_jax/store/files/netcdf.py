@@ -18,9 +18,9 @@ from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import new_file
 from cspr_jax.store.files.stream import DiskFile
 
-# The format whose metadata carry checksums.
+# Versions of the HDF5 format in which metadata have checksums.
 LAYOUT = ("v110", "v110")
-# h5py raises these on a file that is damaged or not HDF5.
+# Errors that h5py raises for a file that is damaged or not HDF5.
 UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError, AttributeError, ArithmeticError)
 
 
@@ -34,14 +34,14 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """HDF5 file that is written into an open, empty file; its checksum trailer follows when HDF5 has closed it."""
+    """Write HDF5 into an open, empty file; the checksum trailer is added when HDF5 has closed it."""
     through = DiskFile(disk, descriptor)
     try:
         with h5py.File(through, "w", libver=LAYOUT) as file:
             set_attributes(file, attributes)
             yield file
     except UNREADABLE:
-        through.raise_failure()  # HDF5's complaint follows from it
+        through.raise_failure()  # HDF5's error is only a consequence
         raise
     through.raise_failure()
     write_trailer(disk, descriptor, through.length)
@@ -86,29 +86,29 @@ def dtype_of(name: str, dtype: str) -> str:
 
 
 def describe(data: h5py.Dataset, quantity: Quantity) -> None:
-    """Write units and names beside a dataset."""
+    """Write units and names as attributes of a dataset."""
     set_attributes(
         data, {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
     )
 
 
 def set_attributes(item: h5py.HLObject, values: dict[str, Any]) -> None:
-    """Write attributes; h5py gives a text back as str only where its length is variable."""
+    """Write attributes, texts with variable length, since only those are read back as str."""
     for name, value in values.items():
         item.attrs[name] = value
 
 
 def plain(value: Any) -> Any:
-    """The value of an attribute as Python has it."""
+    """The value of an attribute in Python's own types."""
     if isinstance(value, bytes):
         return value.decode()
     return value.item() if isinstance(value, np.generic) else value
 
 
 def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
-    """Space that a run needs at most, its shards and its result together."""
+    """Upper bound of the space that shards and result of a run need."""
     one = sum(np.dtype(dtype_of(name, dtype)).itemsize for name in store)
-    # Twice the data, and a tenth for chunks that do not compress and for what describes them.
+    # Shards and result hold the data twice; a tenth is for chunks that do not compress and for metadata.
     return int(2.1 * np.prod([float(n) for n in shape]) * one) + (1 << 20)
 
 

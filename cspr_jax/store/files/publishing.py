@@ -1,7 +1,7 @@
 """Files and folders that are complete or absent.
 
-A file gets its name only when it is complete and on the disk: written under another name in the same
-folder, flushed, renamed, and the folder flushed. A crash leaves the old state or the new one.
+A file gets its name only when it is complete and on the disk: it is written under another name in the same folder,
+flushed, renamed, and the folder flushed. A crash leaves the old state or the new one.
 """
 
 import contextlib
@@ -14,18 +14,18 @@ from pathlib import Path
 from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.files.disk import USUAL, Disk, write_all
 
-LONGEST_NAME = 255  # bytes, of whatever disk
+LONGEST_NAME = 255  # bytes, on all kinds of disks
 # Endings of unfinished files: of this version, and of earlier ones, which named their process.
 PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 
 
 def part_of(path: Path) -> Path:
-    """Name under which a file is written until it is complete; nobody can guess it."""
+    """Name, which cannot be guessed, under which a file is written until it is complete."""
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
 def check_writable(path: Path | None) -> None:
-    """Refuse a file that cannot be written where it is to be, before the long work that it is for."""
+    """Refuse a path at which no file can be written, before long work begins."""
     if path is None:
         return
     is_long = len(os.fsencode(part_of(path).name)) > LONGEST_NAME
@@ -43,10 +43,10 @@ def check_writable(path: Path | None) -> None:
 
 @contextlib.contextmanager
 def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
-    """A file that gets its name when the block ends well, and leaves nothing when it does not."""
+    """A file that gets its name if the block ends without an error, and is removed otherwise."""
     part = part_of(path)
     try:
-        file = disk.create(part, mode)  # where it fails, what has that name is not ours to remove
+        file = disk.create(part, mode)  # if this fails, a file of that name is not ours and must not be removed
         try:
             try:
                 yield file
@@ -55,7 +55,7 @@ def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
                 os.close(file)
             disk.replace(part, path)
         except BaseException:
-            with contextlib.suppress(OSError):  # the first failure tells more
+            with contextlib.suppress(OSError):  # report the first failure
                 disk.unlink(part)
             raise
         disk.sync_folder(path.parent)
@@ -70,7 +70,7 @@ def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
 
 
 def make_folders(disk: Disk, path: Path) -> None:
-    """Make a folder and those above it, each named on the disk before the next."""
+    """Make a folder and its parents, and flush each name to the disk before the next."""
     missing = []
     folder = path
     while not folder.is_dir():

@@ -7,10 +7,10 @@ from cspr_jax.store.files.disk import Disk, write_all
 
 
 class DiskFile(io.RawIOBase):
-    """A new file that HDF5 writes through, and that never fails in HDF5's hands.
+    """A new file that HDF5 writes through, and that never raises an error within HDF5.
 
-    HDF5 can crash the interpreter when the disk refuses a write and it then has to close the file.
-    So the first refusal is kept, everything after it is dropped, and `raise_failure` tells.
+    HDF5 can crash the interpreter if a write fails and it then has to close the file. So the first failure is kept, all
+    later writes are dropped, and `raise_failure` reports it.
 
     Args:
         file: descriptor of an empty file.
@@ -23,11 +23,11 @@ class DiskFile(io.RawIOBase):
 
     @property
     def length(self) -> int:
-        """Bytes that the file has."""
+        """Number of bytes of the file."""
         return self._length
 
     def raise_failure(self) -> None:
-        """Raise what the disk first refused, if it did."""
+        """Raise the first failure, if there was one."""
         if self._failure is not None:
             raise self._failure
 
@@ -41,7 +41,7 @@ class DiskFile(io.RawIOBase):
         return self._at
 
     def readinto(self, buffer, /) -> int:
-        """Read what has been written, or keep the reason why not."""
+        """Read what has been written, or keep the failure."""
         view = memoryview(buffer).cast("B")
         try:
             data = os.pread(self._file, len(view), self._at)
@@ -52,7 +52,7 @@ class DiskFile(io.RawIOBase):
         return len(data)
 
     def write(self, data, /) -> int:
-        """Write all of the data, or keep the reason why not."""
+        """Write all of the data, or keep the failure."""
         view = memoryview(data).cast("B")
         if self._failure is None:
             try:
@@ -64,7 +64,7 @@ class DiskFile(io.RawIOBase):
         return len(view)
 
     def truncate(self, length: int | None = None, /) -> int:
-        """Set the size, or keep the reason why not."""
+        """Set the size, or keep the failure."""
         self._length = self._at if length is None else length
         if self._failure is None:
             try:

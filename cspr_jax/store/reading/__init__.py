@@ -1,1 +1,1 @@
-"""Reading of files that anybody may have made: by a process of its own, checked."""
+"""Reading of files of unknown origin, in a process of its own and with checks."""

@@ -1,7 +1,7 @@
-"""Reading files that anybody may have made: another process does it, which may fail, hang or take all its memory.
+"""Reading of files of unknown origin by another process, which may fail, hang or use all of its memory.
 
-That process starts from nothing (`python -I`, in the root folder, without HDF5's plugins and locks), gets one open file
-after the other, and has a limit of memory and one of processor time for each, which follow from the file's size.
+That process is isolated (`python -I`, in the root folder, without HDF5's plugins and locks), receives one open file
+after the other, and has limits of memory and processor time for each, which depend on the file's size.
 """
 
 import contextlib
@@ -31,11 +31,11 @@ from cspr_jax.store.documents import Header
 from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError, check_open, has_trailer, open_regular
 from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
-# Hashing so many bytes takes a moment; larger files are inspected before they are hashed.
+# Hashing this number of bytes takes a moment; larger files are inspected before they are hashed.
 _QUICK = 512 << 20
-# A reader that has not answered by then never will; the limit of processor time comes long before.
+# Time, s, after which a reader is assumed never to answer; it reaches its limit of processor time long before.
 _PATIENCE = 60.0
-# The package is not taken from the working folder, nor are the libraries; the path of the parent serves last.
+# Neither package nor libraries are taken from the working folder; the path of the parent comes last.
 _CODE = """import sys
 sys.path.extend(sys.argv[1].split("\\n"))
 import h5py, numpy
@@ -45,10 +45,10 @@ del sys.path[0]
 from cspr_jax.store.reading.reader import serve
 serve()
 """
-# It imports these from elsewhere. Each may lie in a folder of its own, as where PYTHONPATH names them one by one.
+# Libraries that the process imports; each may be in a folder of its own, as where PYTHONPATH lists several.
 _LIBRARIES = ("h5py", "numpy", "pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection")
-# A file can end the process that reads it by these signals. Other signals come from people, batch systems or the
-# system's lack of memory, and say nothing about the file.
+# Signals by which a file can end the process that reads it. Other signals come from people, batch systems or a lack of
+# memory, and do not mean that the file is damaged.
 _ENDS = {
     signal.SIGXCPU: "HDF5 finds no end in it",
     **dict.fromkeys((signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL), "HDF5 fails on it"),
@@ -58,16 +58,16 @@ _ENDS = {
 class _Opened(NamedTuple):
     path: Path
     file: int
-    trailer: bytes | None  # None: not compared yet, since the file is large, or there is none
+    trailer: bytes | None  # None: there is none, or it has not been compared yet, since the file is large
     has_trailer: bool
 
 
 class Reader:
-    """A process that reads files, started when the first one is asked for, and anew after one on which it failed.
+    """A process that reads files; it starts with the first file, and again after a file on which it failed.
 
     Fields:
-        trusted: trailers of shards that this process has written, or that were read without an error before: it reads
-            their bytes itself.
+        trusted: trailers of shards that the current process has written, or that were read without an error before; it
+            reads these itself.
     """
 
     def __init__(self) -> None:
@@ -85,11 +85,11 @@ class Reader:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """The process ends."""
+        """End the process."""
         self._end()
 
     def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
-        """Attributes, axes and quantities of a file, as far as this program writes them."""
+        """Read the attributes, axes and quantities of a file, as far as this program writes such."""
         with (
             self._opened(path, follow=True, needs_no_trailer=True) as opened,
             self._answered(opened, {"what": "result", "has_trailer": opened.has_trailer}) as (answer, pipe),
@@ -106,7 +106,7 @@ class Reader:
             return None if "motion" in answer else Content(**self._header(pipe, patience=None)["content"])
 
     def shard(self, path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
-        """A shard, checked in every respect."""
+        """Read a shard and check it completely."""
         words = {"what": "shard", "layout": dataclasses.asdict(layout), "index": index, "shape": shape}
         with self._opened(path, maximum=LARGEST_SHARD) as opened:
             if opened.trailer in self.trusted:
@@ -119,7 +119,7 @@ class Reader:
             return Shard(**answer["shard"], values=values)
 
     def header(self, path: Path) -> Header:
-        """Header of a shard, of whatever run."""
+        """Header of a shard of any run."""
         with (
             self._opened(path, maximum=LARGEST_SHARD) as opened,
             self._answered(opened, {"what": "header"}) as (answer, _),
@@ -155,12 +155,12 @@ class Reader:
             raise self._ended(path) from error
         except DamagedError:
             if trailer is not None:
-                check_open(path, file)  # a disk that fails now does not mean that the file is damaged
+                check_open(path, file)  # if the disk fails now, that does not mean that the file is damaged
             raise
         self._idle = True
 
     def _sent(self, path: Path, file: int, words: dict[str, Any]) -> RawIOBase:
-        # A process that died by itself, or has not finished, is replaced.
+        # Replace a process that has died, or has not finished its last file.
         if self._child is None or self._child.poll() is not None or not self._idle:
             self._end()
             self._start(path)
@@ -177,14 +177,14 @@ class Reader:
     def _start(self, path: Path) -> None:
         home = str(Path(__file__).parents[3])
         settings = {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::", "HDF5_USE_FILE_LOCKING": "FALSE"}
-        with contextlib.suppress(ConfigError):  # told where its map is asked for
+        with contextlib.suppress(ConfigError):  # reported when its map is looked up
             MAP_KINDS.complete()
         quantities = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
         command = [sys.executable, "-I", "-c", _CODE, "\n".join(_library_folders()), home, quantities]
         current, there = socket.socketpair()
         with there:
             try:
-                # A session of its own: Ctrl-C is for us.
+                # The process has its own session, so that a Ctrl-C reaches only this process.
                 self._child = subprocess.Popen(
                     command,
                     stdin=there.fileno(),

@@ -1,4 +1,4 @@
-"""Maps that xarray or dask has joined and written as netCDF: dimensions, types and order as this program has them."""
+"""Maps that xarray or dask has joined and written as netCDF, restored to this program's dimensions, types and order."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.store.files.checksum import DamagedError
 
-# Attributes of the map whose attributes the join has kept: they are not those of the joined one.
+# Attributes that the join has kept from one of the maps, and that are wrong for the joined one.
 _OF_ONE = ("identity", "content_sha256", "proved", "cells_near_zero", "mixed", "environment", "environments")
 
 
@@ -18,7 +18,7 @@ def joined_map(
     arrays: Mapping[str, np.ndarray],
     dimensions: Mapping[str, list[str]],
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, np.ndarray]]:
-    """Attributes, settings and arrays of a joined map, as of a map that was computed as a whole."""
+    """Attributes, settings and arrays of a joined map, in the form of a map that was computed in one run."""
     order = settings["dimensions"]
     for name, names in dimensions.items():
         if sorted(names) != (sorted(order) if name in QUANTITIES else [name]):
@@ -38,7 +38,7 @@ def joined_map(
 
 
 def _typed(name: str, values: np.ndarray) -> np.ndarray:
-    # xarray's merge fills cells by way of NaN, and so makes floats of integers.
+    # xarray's merge fills cells with NaN, which turns integers into floats.
     kind = QUANTITIES[name].kind
     if kind == "float" or values.dtype.kind != "f":
         return values

@@ -1,4 +1,4 @@
-"""Motions of users, whatever file they come in: text, CASPR's XML, or the HDF5 of `cspr plan -o`."""
+"""Motions of users from all kinds of files: text, CASPR's XML, or the HDF5 of `cspr plan -o`."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ XML = ".xml"
 
 
 def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | MotionPieces:
-    """A motion as a whole."""
+    """Read a motion in full."""
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
         return caspr.read(path, trajectory)
@@ -26,7 +26,7 @@ def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | Moti
 
 
 def motion_windows(path: Path, n_rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
-    """A table of samples, window by window, so that its length is not limited; see `config.motions.text.windows`."""
+    """Read a table of samples of any length, window by window; see `config.motions.text.windows`."""
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
         raise ConfigError(path, "must be a table of samples here")
@@ -40,7 +40,7 @@ def motion_windows(path: Path, n_rows: int = text.WINDOW) -> Iterator[text.Motio
 def _samples(path: Path) -> MotionTable:
     try:
         result = open_result(path)
-    except StoreError as error:  # it is the user's input, as a table of text is
+    except StoreError as error:  # the file is the user's input, like a table of text
         raise ConfigError(path, str(error).removeprefix(f"{printable(path)}: ")) from error
     if "position" not in result.data or len(result.axes.get("t", ())) < 2:
         raise ConfigError(path, "is a map, or a plan without a motion: must be a motion of `cspr plan -o`")

@@ -1,7 +1,7 @@
 """Motions as tables: the CSV of `cspr plan -o FILE.csv`, read back.
 
-Its columns are those of a motion file over time. It keeps neither the robot nor the plan nor the segments. Where z
-points follows from the work of the cables; tables of earlier versions say it in a comment below their header.
+Its columns are those of a motion file over time. It contains neither the robot nor the plan nor the segments. The
+direction of z follows from the work of the cables; tables of earlier versions give it in a comment below their header.
 """
 
 from pathlib import Path
@@ -15,11 +15,11 @@ from cspr_jax.schema.quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.files.checksum import DamagedError, unreadable
 from cspr_jax.store.files.netcdf import file_size
 
-# Both are sizes of text; numbers take a third of it in memory. The header has some hundred names.
+# Bytes of text, of which numbers take a third in memory; the header has some hundred names.
 LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
 FEASIBLE = "feasible"
-WORK_ROWS = 4096  # rows whose work is examined
-EXPLAINED = 0.5  # fraction of the work that lifting must explain for its sign to say where z points
+WORK_ROWS = 4096  # largest number of rows whose work is examined
+EXPLAINED = 0.5  # fraction of the work that lifting must explain if its sign is to give the direction of z
 
 
 def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -34,7 +34,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
             table = np.loadtxt(_rows(file, comments), delimiter=",", comments=None, ndmin=2)
     except OSError as error:
         raise unreadable(path, error) from error
-    except ValueError as error:  # of a number, a row or a letter that is none
+    except ValueError as error:  # about an invalid number, row or character
         raise DamagedError(f"its rows cannot be read: {str(error).splitlines()[0]}") from error
     if table.shape[1] != len(heads):
         raise DamagedError(f"its rows have {table.shape[1]} numbers, its header has {len(heads)} names")
@@ -57,8 +57,8 @@ def _axis_in(comments: list[str]) -> str | None:
 
 
 def _vertical(arrays: dict[str, np.ndarray]) -> str | None:
-    # Direction of z, or None where the motion is level: the power of the cables, -tension . rate, is fitted by mass *
-    # velocity . acceleration + weight * velocity_z, and by a term of rotations; the sign of the weight tells.
+    # Direction of z, or None where the motion is level: fit the power of the cables, -tension . rate, by mass *
+    # velocity . acceleration + weight * velocity_z and a term of rotations; the sign of the weight gives the direction.
     needed = ("velocity", "acceleration", "tension", "rate")
     if any(name not in arrays or not np.isfinite(arrays[name]).all() for name in needed):
         return None
@@ -83,7 +83,7 @@ def _vertical(arrays: dict[str, np.ndarray]) -> str | None:
 
 
 def _typed(name: str, values: np.ndarray) -> np.ndarray:
-    # The column in the type of its quantity.
+    # Column of numbers in the type of its quantity.
     kind = TRAJECTORY[name].kind
     if kind == "float":
         return values
@@ -94,7 +94,7 @@ def _typed(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def _rows(file, comments: list[str]):
-    # The lines of the table behind the comments below its header; each ends in a line break, the last one too.
+    # Rows of the table after the comments below its header; each ends with a line break, the last one too.
     line, has_rows = "", False
     for line in file:
         if not line.endswith("\n"):
@@ -109,7 +109,7 @@ def _rows(file, comments: list[str]):
 
 
 def _column_indices(heads: list[str]) -> dict[str, Any]:
-    # Column, or columns, of each quantity; they stand in the order in which `cspr plan` writes them.
+    # Columns of each quantity, which must be in the order in which `cspr plan` writes them.
     names = heads[:-1] if heads[-1] == FEASIBLE else heads
     indices: dict[str, Any] = {}
     start = 0

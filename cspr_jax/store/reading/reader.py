@@ -1,4 +1,4 @@
-"""Work of the process that reads files for another one: see `store.reading.isolated`."""
+"""Program of the process that reads files for another one; see `store.reading.isolated`."""
 
 import contextlib
 import dataclasses
@@ -34,14 +34,15 @@ from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError
 from cspr_jax.store.files.netcdf import UNREADABLE, reason
 from cspr_jax.store.shards import Layout, decode, header_of
 
-# A result is read into memory completely. A byte of a file holds a few bytes of data, or many if these are all equal.
+# Largest size of a result, bytes, all of which is read into memory, and largest number of bytes of data per byte of a
+# file: usually a few, but many if all are equal.
 LARGEST_DATA, DENSEST = 8e9, 50
-# Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
+# Processor time, s, for inspecting a file, and for reading each byte and each chunk, on a slow machine.
 _INSPECTION_SECONDS, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
-# Names of parts of vectors, for other programs.
+# Datasets with names of parts of vectors, which serve other programs.
 _PART_NAMES = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
-# Attribute that libraries of netCDF add to the files that they write.
+# Attribute that libraries for netCDF add to their files.
 _OF_NETCDF = b"_NCProperties"
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
@@ -52,10 +53,10 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer questions about one file after the other, until there are no more.
+    """Serve requests about one file after the other, until there are no more.
 
-    Standard input is a socket: questions come in on it, each with an open file; answers go out, as JSON and arrays. The
-    arguments of the command are two folders of `store.reading.isolated`, and the quantities that the asking process has
+    Standard input is a socket: each request arrives with an open file, and results are sent as JSON and arrays. The
+    arguments of the command are two folders of `store.reading.isolated`, and the quantities that the parent process has
     registered.
     """
     for quantity in json.loads(sys.argv[3]):
@@ -63,7 +64,7 @@ def serve() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     channel = socket.socket(fileno=0)
     out = channel.makefile("wb")
-    _tell(out, {})  # ready
+    _tell(out, {})  # the process is ready
     while (request := _next(channel)) is not None:
         words, file = request
         _grant(_INSPECTION_SECONDS, 0)
@@ -72,7 +73,7 @@ def serve() -> None:
 
 
 def answer(file: Path, words: dict[str, Any], out: BinaryIO) -> None:
-    """Answer one question."""
+    """Serve one request."""
     try:
         _ANSWERS[words["what"]](file, words, out)
     except MemoryError:
@@ -103,7 +104,7 @@ def _exactly(channel: socket.socket, count: int) -> bytes:
 
 
 def _check_netcdf(path: Path) -> None:
-    # Another program's files have no trailer; neither has an incomplete file of this program.
+    # Files of other programs, and incomplete files of this program, have no trailer.
     with contextlib.suppress(*UNREADABLE), h5py.File(path, "r") as file:
         if h5a.exists(file.id, _OF_NETCDF):
             return
@@ -111,7 +112,7 @@ def _check_netcdf(path: Path) -> None:
 
 
 def _dimensions(data: h5py.Dataset) -> list[str]:
-    # The axes themselves are scales, which have none.
+    # Axes are dimension scales, and have no scales themselves.
     if data.is_scale:
         return [Path(data.name).name]
     return [Path(dimension[0].name).name for dimension in data.dims if len(dimension)]
@@ -140,7 +141,7 @@ def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
         _grant_for(datasets.values())
         for one in datasets.values():
             values = one.values()
-            _tell(out, {})  # it could be read
+            _tell(out, {})  # the file could be read
             _send(out, values)
         out.flush()
 
@@ -177,7 +178,7 @@ _ANSWERS = {"result": _result, "content": _content, "shard": _shard, "header": _
 
 
 def _attributes(file: h5py.File) -> dict[str, Any]:
-    # Only attributes that this program writes are read; all others stay where they are.
+    # Read only attributes that this program writes.
     attributes: dict[str, Any] = {name: guard.text(file, name) for name in _LONG}
     attributes |= {name: guard.text(file, name, largest=1 << 16) for name in _TEXTS}
     for names, dtype in ((_INTEGERS, "int64"), (_NUMBERS, "float64")):
@@ -207,18 +208,18 @@ def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
 
 
 def _grant(seconds: float, memory: int) -> None:
-    # Time of the processor, not of the clock, so that a busy machine does not make a file unreadable.
+    # Limit processor time instead of elapsed time, so that a busy machine does not make a file unreadable.
     used = resource.getrusage(resource.RUSAGE_SELF)
     _limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime + seconds))
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[0])
     except OSError:
-        return  # only Linux says it, and only there does the limit work
+        return  # only Linux provides the number, and only there does the limit work
     _limit(resource.RLIMIT_AS, pages * resource.getpagesize() + _MEMORY + memory)
 
 
 class _Limits:
-    # The flag says that narrower limits of somebody else hold: a failure at these says nothing of the file.
+    # True if the system's limits are lower than ours: a failure at those does not mean that the file is damaged.
     are_foreign = False
 
 

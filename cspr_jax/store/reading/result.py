@@ -1,4 +1,4 @@
-"""Reading result files: what another process found in one, checked with the schema of what wrote it."""
+"""Result files: content that another process has read, checked against the schema of the program that wrote it."""
 
 import dataclasses
 from pathlib import Path
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
 # Largest magnitude of the finite numbers of a result, and largest mass, kg.
 LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
-# Settings have some ten tables and lists, and some fifty keys.
+# Largest number of tables, lists and keys of settings, which have some ten tables and lists and some fifty keys.
 _LARGEST_PARTS = 10_000
 _BLOCK = 1 << 20
 
 
 class BestPoints(NamedTuple):
-    """Axis that was taken out of a map, by choosing its best point for every cell.
+    """Axis that was removed from a map by choosing its best point for every cell.
 
     Fields:
-        points: (n,) of the axis.
-        indices: (...) of the best point in the axis, of the shape of the quantities.
+        points: (n,) points of the axis.
+        indices: (...) index of the best point on the axis, in the shape of the quantities.
     """
 
     points: np.ndarray
@@ -49,12 +49,12 @@ class Result:
 
     Fields:
         axes: coordinates by name, in the order of the dimensions.
-        data: quantities by name, each with the dimensions of `axes` (of a map), or as stored (of a motion).
-        units: of axes and quantities.
+        data: quantities by name, with the dimensions of `axes` for a map, as stored for a motion.
+        units: units of axes and quantities.
         labels: long names of axes and quantities.
-        attributes: of the file, those that this program writes.
-        settings: of the sweep; empty for a motion.
-        choices: axes of the sweep that `best` has taken out, by name.
+        attributes: those attributes of the file that this program writes.
+        settings: settings of the sweep; empty for a motion.
+        choices: axes of the sweep that `best` has removed, by name.
     """
 
     axes: dict[str, np.ndarray]
@@ -110,9 +110,9 @@ class Result:
 
 
 def open_result(path: Path) -> Result:
-    """Read a result of `cspr run`, one that xarray has joined of several, or a motion of `cspr plan -o`.
+    """Read a result of `cspr run`, a map that xarray has joined from several, or a motion of `cspr plan -o`.
 
-    A motion in a .csv file has neither robot nor plan nor segments; it is named after its file.
+    A motion in a .csv file has neither robot nor plan nor segments, and the name of its file as its name.
 
     An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and its content is
     checked like a sweep file.
@@ -139,7 +139,7 @@ def open_result(path: Path) -> Result:
 
 
 def motion_result(attributes: dict[str, Any], arrays: dict[str, np.ndarray]) -> Result:
-    """A motion that was computed, as it would be read from a motion file."""
+    """A computed motion in the form in which it would be read from a motion file."""
     try:
         axes, data = _motion(attributes, dict(sorted(arrays.items())), keeps_robot=True)
     except DamagedError as error:
@@ -153,7 +153,7 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[st
 
 
 def _described(kind: object, names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
-    # Units and long names, as the kind of map says them.
+    # Units and long names, from the rows of the kind of map.
     quantities = {name: quantity_of(kind, name) for name in names}
     return {name: quantity.units for name, quantity in quantities.items()}, {
         name: quantity.long_name for name, quantity in quantities.items()
@@ -164,7 +164,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     text = attributes.get(name)
     if text is None:
         raise DamagedError(f"it has no {name}")
-    # This is checked before anything is built from the text.
+    # Check sizes before anything is built from the text.
     if max(text.count("[") + text.count("{"), text.count(":")) > _LARGEST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:
@@ -177,7 +177,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
-    # Settings are the keys of a sweep file, with its robot and the order of the axes.
+    # Settings are the content of a sweep file, with its robot and the order of the axes.
     settings = _json(attributes, "settings")
     checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
     robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
@@ -191,7 +191,7 @@ def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def _check_robot(attributes: dict[str, Any], path: Path) -> None:
-    # Pictures show these attributes of the robot. Motions of earlier versions have no more than its name.
+    # Check attributes of the robot that pictures show, of which motions of earlier versions have only the name.
     name, z_axis, points = attributes.get("robot"), attributes.get("z_axis", "down"), attributes.get("base_points")
     if not isinstance(name, str) or not 0 < len(name) <= 200:
         raise DamagedError(f"robot = {shown(name)}: must be a name of at most 200 characters")
@@ -241,7 +241,7 @@ def _motion(
         raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
     if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MAX_CABLES:
         raise DamagedError("it is not a motion of two cables or more")
-    # Motions of straight lines know no P0.
+    # Motions along straight lines have no P0.
     bounds = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
     for name, maximum in bounds.items():
         if not 1.0 / maximum <= attributes.get(name, 0.0) <= maximum:
@@ -267,7 +267,7 @@ def _motion(
         kinds = EVERY[name].readable
         if array.shape != shape or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
             raise DamagedError(f"{name} has another shape or type than in a motion")
-        # The best candidate of a motion that is not feasible may pass a singularity.
+        # The best candidate of a motion that is not feasible may pass a singularity, where tensions are infinite.
         _check_numbers(name, array, LARGEST_NUMBER, finite=name not in _OPEN)
     if (np.diff(time) < 0.0).any():
         raise DamagedError("its time runs backwards")
@@ -275,7 +275,7 @@ def _motion(
 
 
 def _as_now(name: str, array: np.ndarray) -> np.ndarray:
-    # In the type that this version stores; no number changes.
+    # Convert to the type of this version, which changes no number.
     kind = EVERY[name].kind
     return array if kind == "float" else array.astype(kind, copy=False)
 

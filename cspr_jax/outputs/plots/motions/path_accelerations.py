@@ -93,7 +93,7 @@ def _poses(result: Result, robot_file: RobotFile, plan_file: PlanFile) -> np.nda
 
 
 def _first_row(time: np.ndarray, start: float) -> int:
-    # Where segments meet there are two rows: the first one belongs to the segment before.
+    # There are two rows where segments meet: the first one belongs to the segment before.
     rows = np.searchsorted(time, start + np.array([-1e-12, 1e-12]) * max(abs(start), 1.0), "left")
     return int(rows[0] + (rows[1] - rows[0]) // 2)
 
