@@ -36,7 +36,7 @@ class Columns:
         return labelled.over(self.arrays(), dims)
 
     def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The answers at the best point of one dimension, for answers to all combinations of coordinates, as in maps."""
+        """The answers at the best point of one dimension, if they cover all combinations of coordinates."""
         from cspr_jax.schema import labelled
         from cspr_jax.schema.best import best_of, check_axis
 

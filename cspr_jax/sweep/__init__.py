@@ -1,1 +1,1 @@
-"""Sweeps: the definition in a file, executors of its tiles, and runs that go on after they were stopped."""
+"""Sweeps: their definition in a file, executors of their tiles, and runs that can be resumed."""

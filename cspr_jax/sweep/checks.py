@@ -1,4 +1,4 @@
-"""Checks that each kind of map makes of its sweep file, beyond the schema, as its row in `schema.map_kinds` says."""
+"""Checks of sweep files beyond the schema, by the row of their kind of map in `schema.map_kinds`."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ _SPECIAL = (
     "point",
     *ObstacleKeys.model_fields,
 )
-# A hint names at most so many kinds.
+# Largest number of kinds that a hint names.
 _FEW = 3
 
 
@@ -83,7 +83,7 @@ def is_given(spec: SweepFile, name: str) -> bool:
 
 
 def is_asked(spec: SweepFile, robot: RobotFile, name: str) -> bool:
-    """Tell whether a sweep, or its robot, asks for what a key stands for."""
+    """Tell whether a sweep or its robot gives a key, so that quantities that depend on it have values."""
     table, _, last = name.rpartition(".")
     if table == "workspace.conditions":
         return last in (spec.workspace or WorkspaceTable()).conditions
@@ -93,7 +93,7 @@ def is_asked(spec: SweepFile, robot: RobotFile, name: str) -> bool:
 
 
 def check_store(kind: MapKind, spec: SweepFile, robot: RobotFile, path: Path) -> None:
-    """Refuse to store quantities that the map does not give, or that the sweep does not ask for."""
+    """Refuse to store quantities that the map does not have, or whose keys the sweep does not give."""
     for name in spec.run.store or ():
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
@@ -108,7 +108,7 @@ def _as_written(name: str) -> str:
 
 
 def _missing(spec: SweepFile, name: str) -> str | None:
-    # Return the words for a dotted key that is missing; None if it is given.
+    # Words for a dotted key that is missing; None if it is given.
     table: Table = spec
     for part in name.split("."):
         inner = getattr(table, part)

@@ -1,4 +1,4 @@
-"""Ownership of a run directory, and what may be continued in it."""
+"""Ownership of a run directory: which sweep and environment may continue in it."""
 
 import contextlib
 import os
@@ -22,7 +22,7 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
         if record.identity != sweep.identity:
             raise RefusedError(*differing(sweep, folder, record.settings))
         return
-    # Without a valid record, shards and results say to which sweep they belong.
+    # Without a valid record, take the identity of the sweep from shards and results.
     for path in sorted(folder.path.glob("*.h5")):
         content = content_at(path, reader)
         if isinstance(content, Content) and content.identity != sweep.identity:
@@ -32,9 +32,9 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
 
 
 def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
-    """Refuse a directory where somebody else keeps files under the names of a run.
+    """Refuse a directory in which files of other origin have names of a run's files.
 
-    A run makes its lock before anything else: beside a lock, an incomplete file is a damaged one.
+    A run makes its lock before anything else: where there is a lock, an incomplete file is a damaged one of a run.
     """
     if folder.lock.exists() or _record(folder.record) is not None or _owners(folder, reader):
         return
@@ -50,7 +50,7 @@ def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list
 
 
 def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool, reader: Reader) -> None:
-    """Refuse to go on with another program, library or machine than began."""
+    """Refuse to continue with another program, library or machine than the run began with."""
     record = _record(folder.record)
     if accept or (record is not None and record.environment == environment):
         return
@@ -73,7 +73,7 @@ def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
 
 
 def damage(path: Path) -> str | None:
-    """Damage of a run.json, in words."""
+    """Damage of a run.json, in words; None if there is none."""
     if not (path.exists() or path.is_symlink()):
         return None
     try:
@@ -95,7 +95,7 @@ def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], com
 
 
 def _record(path: Path) -> Record | None:
-    # None where there is none, or a damaged one.
+    # Record of a directory; None where it is missing or damaged.
     try:
         return read_record(path)
     except DamagedError:
@@ -103,7 +103,7 @@ def _record(path: Path) -> Record | None:
 
 
 def content_at(path: Path, reader: Reader) -> Content | str:
-    """Content of a result in a run directory."""
+    """Content of a result in a run directory, or its damage in words."""
     try:
         return reader.content(path) or "it is a motion"
     except DamagedError as error:
@@ -111,7 +111,7 @@ def content_at(path: Path, reader: Reader) -> Content | str:
 
 
 def _owners(folder: RunFolder, reader: Reader) -> set[tuple[str, str]]:
-    # Identities of sweeps, each with the hash of an environment; damaged shards are passed over.
+    # Identities of sweeps with hashes of environments, from all shards that are not damaged.
     owners = set()
     for path in folder.shard_names():
         with contextlib.suppress(DamagedError):

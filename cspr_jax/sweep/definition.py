@@ -1,4 +1,4 @@
-"""A sweep: its file, checked, with everything that decides its result."""
+"""A sweep: its checked file, and everything that determines its result."""
 
 import dataclasses
 import functools
@@ -26,12 +26,12 @@ from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points, check_store, is_asked, is_given
 from cspr_jax.sweep.tile_sizes import tile_cells
 
-# Each tile is a file.
+# Largest number of tiles, each of which is a file.
 LARGEST_TILES = 100_000
 LARGEST_RESULT = 1 << 46  # bytes; the free space on the disk is checked when a run starts
-LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
-# Maps of fewer cells are done before a GPU has compiled its code; those whose cells cost more seconds are searches and
-# proofs in many short steps, for each of which a GPU has to start (docs/performance.md, GPU).
+LONGEST_NAME = 200  # bytes, so that file systems accept names that are made from it
+# Maps of fewer cells are finished before a GPU has compiled its code. Maps with more seconds per cell are searches and
+# proofs of many short steps, each of which a GPU has to launch (docs/performance.md, GPU).
 MIN_FOR_GPU, MAX_SECONDS_FOR_GPU = 100_000, 1e-3
 
 
@@ -40,15 +40,15 @@ class Sweep:
     """A checked sweep.
 
     Fields:
-        file: where it was read.
-        kind: of its map.
-        spec: its content.
-        robot: its robot, or the equivalent that its map moves, `config.equivalents`.
+        file: path of its file.
+        kind: kind of its map.
+        spec: content of the file.
+        robot: its robot, or the equivalent that its map moves; see `config.equivalents`.
         grid: its axes and tiles.
-        store: quantities to keep.
-        settings: everything that decides the result's numbers.
-        text: of the file, as it was read.
-        types: NumPy name of the type of each stored quantity, for processes that know no rows from outside.
+        store: quantities to store.
+        settings: everything that determines the numbers of the result.
+        text: text of the file, as it was read.
+        types: NumPy name of the type of each stored quantity, for processes without rows from outside of the package.
     """
 
     file: Path
@@ -68,23 +68,23 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """The file's name, without its ending."""
+        """Name of the file, without its ending."""
         return self.file.stem
 
     @property
     def prefers_cpu(self) -> bool:
-        """Tell whether a GPU would take longer."""
+        """Tell whether a GPU would take longer than the CPU."""
         is_stepwise = self.kind.by_processes or self.kind.cost.seconds > MAX_SECONDS_FOR_GPU
         return is_stepwise or self.grid.n_cells < MIN_FOR_GPU
 
     @functools.cached_property
     def layout(self) -> Layout:
-        """Layout that its shards share."""
+        """Layout that all shards share."""
         return Layout(self.identity, self.store, self.spec.run.dtype)
 
 
 def read_sweep(path: Path) -> Sweep:
-    """A sweep file, checked without computing anything."""
+    """Read a sweep file and check it, without computing anything."""
     if len(os.fsencode(path.stem)) > LONGEST_NAME:
         raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
@@ -92,7 +92,7 @@ def read_sweep(path: Path) -> Sweep:
 
 
 def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
-    """A sweep file's parsed content, checked without computing anything."""
+    """Check the parsed content of a sweep file, without computing anything."""
     refuse_other_kinds(data, "sweep", path)
     spec = checked(SweepFile, data, path)
     robot = resolve_robot(spec.robot, path, path.parent)
@@ -111,7 +111,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     axes = {name: axis_points(getattr(spec.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= orientation_axes
-    # Keys that are not given decide nothing: a key that a later version adds leaves old identities as they are.
+    # Leave out keys that are not given, so that keys of later versions do not change old identities.
     settings = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
@@ -120,7 +120,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 
 def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
-    """The sweep that a run has recorded, whatever has become of its file."""
+    """The sweep that a run has recorded, even if its file has changed or is gone."""
     spec = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
     robot, kind = (
         checked(RobotFile, settings["robot"], file, at="robot"),
@@ -136,7 +136,7 @@ def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> S
 
 
 def _usual(kind: MapKind, spec: SweepFile, robot: RobotFile) -> list[str]:
-    # These quantities are stored where the file does not name any.
+    # Quantities that are stored by default.
     more = [names for key, names in kind.stored_with if is_given(spec, key)]
     names = dict.fromkeys((*kind.stored, *itertools.chain(*more)))
     needed = {name: kind.keys_of(name) for name in names}
@@ -166,7 +166,7 @@ def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
-    # This check comes before any memory is taken; `check_disk_space` looks at the free space when the run starts.
+    # Check before memory is allocated; `check_disk_space` compares with the free space when the run starts.
     shape, label = tuple(counts.values()), f"axes: {_cells_of(counts)}"
     if needed > LARGEST_RESULT:
         raise ConfigError(path, f"{label} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
@@ -197,14 +197,14 @@ def check_disk_space(sweep: Sweep, directory: Path, done: float) -> None:
 
 
 def _cells_of(counts: dict[str, int]) -> str:
-    # Which axis has how many points, and which has most.
+    # Words for the numbers of points, and for the axis with the most.
     largest = max(counts, key=lambda name: counts[name])
     cells = f"{' x '.join(str(n) for n in counts.values())} ({', '.join(counts)})"
     return f"a grid of {cells}, most along {largest},"
 
 
 def run_directory(sweep: Sweep) -> Path:
-    """Directory of a sweep's result without -o."""
+    """Default directory of a sweep's result, without -o."""
     return Path("results") / f"{sweep.file.stem}-{sweep.identity[:12]}"
 
 
@@ -213,7 +213,7 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
     robot, words = sweep.robot, [sweep.kind.title, f"robot {sweep.robot.name}"]
     if "workspace" in sweep.kind.takes:
         words += (sweep.spec.workspace or WorkspaceTable()).conditions
-    # Turns on one ellipse have no amplitude function.
+    # Motions on one ellipse have no amplitude function.
     if sweep.kind.families and sweep.spec.trajectory.takes_amplitude and "ellipse" not in sweep.kind.takes:
         words.append(f"amplitude {sweep.settings['trajectory']['amplitude']}")
     return {

@@ -21,13 +21,13 @@ from cspr_jax.sweep.tile import compute_tile
 from cspr_jax.sweep.work import Computed
 
 SECONDS_TO_CONNECT = 20
-# A scheduler whose machine takes no connection, or that was lost and does not come back, is given up after these.
+# Times, s, after which a scheduler is given up: it cannot be reached, its machine refuses connections, or it was lost.
 SECONDS_TO_REACH, SECONDS_FOR_REFUSAL, SECONDS_LOST = 3.5, 1.0, 3.0
-# A cluster's queue may let workers wait; people are told after the first of these.
+# Workers may wait in a cluster's queue: times, s, after which the user is told, and after which the run gives up.
 SECONDS_FOR_WORKERS = (5, 900)
-# How long a wish to stop may go unseen.
+# Interval of checks for a request to stop, s.
 POLL_SECONDS = 0.5
-# Tiles in flight for each thread of a worker: one computes while another travels.
+# Tiles in progress for each thread of a worker: one is computed while another is sent.
 AHEAD = 2
 
 
@@ -35,14 +35,14 @@ class Scheduler:
     """Tiles on the workers of a scheduler; dask computes the tiles of a lost worker again.
 
     Args:
-        address: of the scheduler, such as tcp://host:8786.
-        accept_environment_change: whether workers may differ from one another.
-        stop: when it is set, nobody waits for workers any longer.
-        warn: called with a line for people.
+        address: address of the scheduler, such as tcp://host:8786.
+        accept_environment_change: whether workers may have different environments.
+        stop: request to stop, which also ends waiting for workers.
+        warn: function that is called with a line for the user.
 
     Raises:
         ConfigError: dask.distributed is not installed, or the address is wrong.
-        ResourceError: no scheduler or no worker there.
+        ResourceError: there is no scheduler, or no worker.
         StoppedError: asked to stop before a worker came.
     """
 
@@ -77,11 +77,11 @@ class Scheduler:
                 f"--scheduler {address}: no scheduler answers: start one, or mend the address"
             ) from error
         try:
-            self._wait_for_workers(Stop() if stop is None else stop)  # an unset one is false
+            self._wait_for_workers(Stop() if stop is None else stop)  # a stop that nobody has requested is false
         except BaseException:
             self.close()
             raise
-        # Like a tile, it is made again where its worker was lost.
+        # Like a tile, dask computes it again if its worker is lost.
         self._sweep = self._client.submit(bytes, pickle.dumps(sweep), pure=False)
 
     def _wait_for_workers(self, stop: Stop) -> None:
@@ -102,7 +102,7 @@ class Scheduler:
         """Environment that all workers share."""
         try:
             environments = list(self._client.run(environment).values())
-        except Exception as error:  # dask raises it for whatever a worker cannot import
+        except Exception as error:  # dask raises errors of any type for modules that workers cannot import
             raise ResourceError(
                 f"--scheduler {self._address}: a worker cannot run cspr_jax: {reason(error)}: install the same there"
             ) from error
@@ -131,7 +131,7 @@ class Scheduler:
             while running or (waiting and not stop):
                 if lost.is_so():
                     raise ConnectionError
-                # Workers come and go: as many as there are now decide how much is in flight.
+                # Workers come and go: the current number of threads determines how many tiles are in progress.
                 threads = self._threads()
                 if threads is None:
                     continue
@@ -159,7 +159,7 @@ class Scheduler:
             ) from error
 
     def _threads(self) -> int | None:
-        # None where the scheduler does not answer now: it may be busy, or lost.
+        # None where the scheduler does not answer, since it is busy or lost.
         if self._client.status != "running":
             time.sleep(POLL_SECONDS)
             return None
@@ -170,13 +170,13 @@ class Scheduler:
         return sum(counts.values())
 
     def close(self) -> None:
-        """Leave the scheduler; tiles in flight there are given up."""
+        """Leave the scheduler, and cancel tiles that are in progress there."""
         with contextlib.suppress(OSError, TimeoutError):
             self._client.close(timeout=SECONDS_LOST)
 
 
 class _Lost:
-    # Tells whether the connection is lost, and has been for some time: dask tries to make it again.
+    # Tells whether the connection has been lost for some time, during which dask tries to restore it.
 
     def __init__(self, client: Any) -> None:
         self._client, self._since = client, math.inf
@@ -188,13 +188,13 @@ class _Lost:
 
 
 def _is_reached(address: str) -> bool:
-    # dask tries again and again, for as long as a slow scheduler may take to answer; it also says what an address is.
+    # dask retries for as long as a slow scheduler may take to answer; it also parses addresses.
     url = urllib.parse.urlsplit(address if "://" in address else f"tcp://{address}")
     try:
         if url.scheme in ("tcp", "tls") and url.hostname and url.port is not None:
             socket.create_connection((url.hostname, url.port), SECONDS_TO_REACH).close()
     except OSError:
         return False
-    except ValueError:  # its port is none
+    except ValueError:  # the port is no number
         return True
     return True

@@ -1,7 +1,7 @@
-"""A run: from a checked sweep to its result, going on where an earlier process was stopped or killed.
+"""A run: from a checked sweep to its result, resumed where an earlier process was stopped or killed.
 
-The run directory is its own manifest. Nothing is remembered beside the shards; whatever moment a
-process dies at, the next one finds verified shards, computes the rest, and ends with the same bytes.
+The run directory is its own manifest: progress is stored in the shards alone. Whenever a process dies, the next one
+finds verified shards, computes the rest, and ends with the same bytes.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ class Options:
         accept_environment_change: whether shards of another environment may be mixed in.
         prune: whether shards are removed once the result is complete.
         command: words of the command, for run.json.
-        tiles: first and end of the tiles that are computed now; None: all.
+        tiles: range (first, end) of the tiles to compute; None: all.
     """
 
     accept_environment_change: bool = False
@@ -49,9 +49,9 @@ class RunSummary:
     """Result of a run, in numbers.
 
     Fields:
-        result: path of the finished file; of the directory, where only some tiles were asked for.
-        computed: number of tiles computed now.
-        reused: number of tiles found finished.
+        result: path of the finished file, or of the directory if only some tiles were requested.
+        computed: number of tiles that this run has computed.
+        reused: number of tiles that were finished before.
     """
 
     result: Path
@@ -61,12 +61,12 @@ class RunSummary:
 
 @dataclasses.dataclass
 class Hooks:
-    """Hooks by which a run reports, and asks whether to go on.
+    """Hooks by which a run reports progress, and learns whether to stop.
 
     Fields:
-        stop: set when it shall end after the tile in progress.
-        on_tile: called with cells done and cells in all.
-        warn: called with a line for people.
+        stop: request to end after the tile in progress.
+        on_tile: function that is called with the numbers of finished and of all cells.
+        warn: function that is called with a line for the user.
     """
 
     stop: Stop = dataclasses.field(default_factory=Stop)
@@ -75,12 +75,12 @@ class Hooks:
 
 
 class Run:
-    """One process's work on a run directory.
+    """Work of one process on a run directory.
 
     Args:
-        directory: the run's own folder; made if absent.
-        options: how it goes on.
-        hooks: by which it reports, and asks whether to go on.
+        directory: folder of the run, which is made if it is absent.
+        options: options of the run.
+        hooks: hooks by which it reports progress, and learns whether to stop.
     """
 
     def __init__(
@@ -91,14 +91,14 @@ class Run:
         hooks: Hooks | None = None,
         disk: Disk | None = None,
     ) -> None:
-        """Nothing is touched yet."""
+        """Keep the arguments, without any access to the disk."""
         self._sweep, self._disk = sweep, disk or Disk()
         self._options, self._hooks = options or Options(), hooks or Hooks()
         self._folder, self._reader = RunFolder(directory, sweep.name, self._disk), Reader()
         self._tiling = sweep.grid.tiling
 
     def finished(self) -> Path | None:
-        """The result, if it is complete and undamaged; nothing is computed and jax is not needed."""
+        """The result, if it is complete and undamaged; neither computing nor jax is needed."""
         with self._reader:
             claims.refuse_other_sweep(self._sweep, self._folder, self._reader)
             if not self._folder.result.exists():
@@ -124,7 +124,7 @@ class Run:
         claims.refuse_strangers(self._folder, self._reader)
         check_disk_space(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
         environment, accept = executor.environment(), self._options.accept_environment_change
-        claims.refuse_other_environment(self._folder, environment, accept, self._reader)  # before anything is made
+        claims.refuse_other_environment(self._folder, environment, accept, self._reader)  # before any file is made
         self._folder.make()
         with self._folder.locked():
             claims.refuse_other_sweep(self._sweep, self._folder, self._reader)
@@ -161,7 +161,7 @@ class Run:
         return self._reader.shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))
 
     def _verified(self, environment: str) -> list[int]:
-        # Return the tiles whose shard is there and undamaged; anything else under their names is set aside.
+        # Tiles whose shards exist and are undamaged; other files of these names are set aside.
         finished_tiles = []
         for path, index in self._folder.shard_names().items():
             try:
@@ -205,7 +205,7 @@ class Run:
 
     def _note_stop(self) -> None:
         code = self._hooks.stop.code
-        with contextlib.suppress(StoreError):  # the note is for people only; nothing is decided by it
+        with contextlib.suppress(StoreError):  # the note is for information only
             by = {ExitCode.TERMINATED: "SIGTERM", ExitCode.INTERRUPTED: "Ctrl-C"}.get(code) if code else None
             self._folder.note("stopped", by=by)
 
@@ -258,5 +258,5 @@ class Run:
 
 
 def _as_generator(tiles: Iterator[Computed]) -> Generator[Computed, None, None]:
-    # Return an iterator that can be closed, so that workers end when publishing fails.
+    # An iterator that can be closed, so that workers end if publishing fails.
     yield from tiles

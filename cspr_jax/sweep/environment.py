@@ -1,4 +1,4 @@
-"""Environment of a computation: code, libraries and machine, as far as they can change the bits of a result."""
+"""Environment of a computation: code, libraries and machine, as far as they can change bits of a result."""
 
 import functools
 import hashlib
@@ -17,7 +17,7 @@ LIBRARIES = ("jax", "jaxlib", "numpy", "h5py")
 
 @functools.cache
 def environment() -> dict[str, Any]:
-    """Everything that a worker's bits can depend on; equal environments give equal bits."""
+    """Everything on which bits of results can depend; equal environments give equal bits."""
     import h5py
     import jax
 
@@ -41,10 +41,10 @@ def environment() -> dict[str, Any]:
 
 
 def package_hash() -> str:
-    """SHA-256 over the package's own files: it works without git and sees uncommitted changes."""
+    """SHA-256 of the package's own files, which needs no git and includes uncommitted changes."""
     total = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*")):
-        # Examples are in a wheel alone, and nothing is computed with them.
+        # Leave out examples, which only wheels contain and nothing is computed with.
         if path.suffix in (".py", ".toml") and PACKAGE / "examples" not in path.parents:
             total.update(f"{path.relative_to(PACKAGE).as_posix()}\0".encode())
             total.update(hashlib.sha256(path.read_bytes()).digest())
@@ -52,7 +52,7 @@ def package_hash() -> str:
 
 
 def _git() -> dict[str, Any]:
-    # Git is asked about the checkout that holds the package, if there is one.
+    # Ask git about the checkout that contains the package, if there is one.
     def ask(*words: str) -> str | None:
         try:
             done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, timeout=60)
@@ -66,7 +66,7 @@ def _git() -> dict[str, Any]:
 
 
 def _processor() -> tuple[str, str]:
-    # Return the name, and a hash of the instruction sets, by which compilers choose code.
+    # Name of the processor, and a hash of its instruction sets, on which compiled code depends.
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Executors that compute the tiles: this process, or several on this machine. One process publishes."""
+"""Executors that compute tiles: in this process, or in several on this machine. This process alone publishes them."""
 
 import collections
 import concurrent.futures
@@ -16,9 +16,9 @@ from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.tile import TileMap, compute_tile
 from cspr_jax.sweep.work import Computed
 
-# Largest number of times that workers may die in a row, without finishing a tile.
+# Largest number of times in a row that workers may die without finishing a tile.
 DEATHS = 3
-# If nobody says how many workers, each gets at least so many tiles, since it compiles for itself.
+# Smallest number of tiles for each worker, by default, since each compiles for itself.
 TILES_EACH = 4
 
 
@@ -41,7 +41,7 @@ class ThisProcess:
             yield self._tile_map(index)
 
 
-# The sweep of a worker process: it is sent once, not with each tile.
+# The sweep of a worker process, which is sent once, not with each tile.
 _sweep: list[bytes] = []
 
 
@@ -54,7 +54,7 @@ def _take(pickled: bytes) -> None:
 
 
 def usual_workers(sweep: Sweep) -> int:
-    """Number of processes for a sweep where nobody says how many."""
+    """Default number of processes for a sweep."""
     return usual_count(len(sweep.grid.tiling) // TILES_EACH) if sweep.kind.by_processes else 1
 
 
@@ -62,7 +62,7 @@ class Processes:
     """Tiles in several processes of this machine.
 
     Args:
-        count: how many processes.
+        count: number of processes.
     """
 
     def __init__(self, sweep: Sweep, count: int) -> None:
@@ -70,11 +70,11 @@ class Processes:
         self._pickled, self._count = pickle.dumps(sweep), count
 
     def environment(self) -> dict[str, Any]:
-        """Environment of the computation: workers are the same program on the same machine."""
+        """Environment of the computation, the same for workers and this process."""
         return environment()
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
-        """Compute tiles in any order; one whose worker died is computed again."""
+        """Compute tiles in any order; a tile whose worker died is computed again."""
         waiting, deaths = dict.fromkeys(indices), 0
         while waiting and not stop:
             try:
@@ -105,7 +105,7 @@ class Processes:
                 for future in done:
                     yield future.result()
         except BrokenProcessPool:
-            # The pool asks the others to end, but they ignore signals, and may wait for a lock that the dead one held.
+            # Other workers ignore the signals of the pool, and may wait for a lock that the dead one held.
             workers.kill()
             raise
         finally:

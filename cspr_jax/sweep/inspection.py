@@ -1,4 +1,4 @@
-"""Content of a run directory: read without the lock, and without writing anything."""
+"""Inspection of a run directory, without its lock and without writing anything."""
 
 import contextlib
 import datetime
@@ -29,7 +29,7 @@ LOG_TAIL = 1 << 16
 
 
 def status(directory: Path) -> dict[str, Any]:
-    """Progress of a run, from the names in its directory."""
+    """Progress of a run, from names of files in its directory."""
     record = _record(directory)
     folder = _folder(directory, record)
     tiling = _settings(record).tiling
@@ -60,9 +60,9 @@ def status(directory: Path) -> dict[str, Any]:
 
 
 def verify(path: Path) -> dict[str, Any]:
-    """Read again everything of a run, or one result or motion file."""
+    """Verify all files of a run, or a single result or motion file, by reading them."""
     if path.is_file():
-        # A link that a user names is followed.
+        # Follow links that a user names.
         return _verify_file(path, {"schema": 1, "path": str(path), "faults": []})
     record = _record(path)
     folder, tiling = _folder(path, record), _settings(record).tiling
@@ -80,14 +80,14 @@ def verify(path: Path) -> dict[str, Any]:
             ):
                 report["shards"] += 1
         if os.path.lexists(folder.result):
-            # Shards may have been pruned: the result stands for them.
+            # Shards may have been pruned, since the result contains them.
             report["result"] = str(folder.result)
             _is_read(report, folder.result, lambda: _count_result(folder.result, record, report, reader))
     return report
 
 
 def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> bool:
-    # Damaged files are reported; a file that the system or the disk refuses to read may be intact.
+    # Report damaged files; a file that the system or the disk refuses to read may be intact.
     try:
         read()
     except DamagedError as error:
@@ -121,7 +121,7 @@ def _verify_file(path: Path, report: dict[str, Any]) -> dict[str, Any]:
         result = open_result(path)
     except StoreError as error:
         return report | {"motion": str(path), "faults": [str(error)]}
-    # Motions of earlier versions say nothing of their segments.
+    # Motions of earlier versions have no quantities of segments.
     segments = result.data.get("segment", np.empty(0)).size or None
     feasible = result.attributes.get("feasible")
     counts = {
@@ -170,7 +170,7 @@ def _settings(record: Record) -> Settings:
 
 
 def _entries(log: Path) -> list[dict[str, Any]]:
-    # The last complete lines of the log, the newest first; nothing depends on them.
+    # Last complete lines of the log, the newest first, for information only.
     try:
         lines = read_regular(log, LOG_TAIL, last=True).splitlines()
     except (DamagedError, StoreError):
@@ -183,7 +183,7 @@ def _entries(log: Path) -> list[dict[str, Any]]:
 
 
 def _seconds(entry: dict[str, Any]) -> float | None:
-    # The time of an entry; earlier versions wrote no more than the time of day.
+    # Time of an entry, of which earlier versions wrote only the time of day.
     seconds = entry.get("seconds")
     if isinstance(seconds, int | float):
         return float(seconds)
@@ -193,7 +193,7 @@ def _seconds(entry: dict[str, Any]) -> float | None:
 
 
 def _rate_estimate(entries: list[dict[str, Any]], tiling: Tiling, done: int, time_now: float) -> RateEstimate:
-    # As the process that wrote last knows it, from its log, the newest entry first.
+    # Estimate the rate like the process that wrote last, from its entries in the log, the newest first.
     events = list[tuple[float, int]]()
     for entry in entries:
         seconds, index = _seconds(entry), entry.get("index")
@@ -212,14 +212,14 @@ def _rate_estimate(entries: list[dict[str, Any]], tiling: Tiling, done: int, tim
 
 
 def _left(estimate: RateEstimate, cells: int, time_now: float | None) -> float | None:
-    # Time goes on while a process computes.
+    # The remaining time decreases while a process computes.
     if estimate.rate is None or estimate.ends is None:
         return None
     return cells / estimate.rate if time_now is None else max(estimate.ends - time_now, 0.0)
 
 
 def _state(is_held: bool | None, entries: list[dict[str, Any]], time_now: float) -> tuple[str, str]:
-    # State of a run: one word for programs, and a text for people.
+    # State of a run: a word for programs, and a text for people.
     last = entries[0] if entries else None
     if is_held is None:
         return "unknown", "whether it runs cannot be told here: its disk has no locks"

@@ -1,4 +1,4 @@
-"""Join of maps: parts of one map, computed apart, or maps that differ in the points of one axis.
+"""Joining of maps: parts of one map that were computed separately, or maps that differ in the points of one axis.
 
 The joined map is a run like any other, whose tiles are read instead of computed: it is published, checked and resumed
 by `sweep.engine`. Parts of one map keep their identity, and give the bytes that one run would have given.
@@ -29,23 +29,23 @@ from cspr_jax.sweep.definition import Sweep, sweep_of_settings
 from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.work import Computed
 
-# Equal cells of two maps may differ by rounding: their batches have other shapes.
+# Cells that two maps share may differ by rounding, since their batches have different shapes.
 _SAME = {"float64": 1e-6, "float32": 1e-3}
 _NEAR_ZERO = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """A map, or the tiles of one that are finished.
+    """A map, or its finished tiles.
 
     Fields:
-        path: as it was named.
-        sweep: of the map.
-        environment: that computed it.
-        data: quantities over the whole grid.
-        present: cells that are finished, of the shape of the grid.
-        shards: of finished tiles, by index, without their values; a result has none.
-        says_proved: whether it says how much of it is proved.
+        path: path as the user gave it.
+        sweep: sweep of the map.
+        environment: environment that computed it.
+        data: quantities over the full grid.
+        present: mask of the finished cells, in the shape of the grid.
+        shards: shards of finished tiles, by index, without their values; a result has none.
+        says_proved: whether it has the number of cells that are proved.
     """
 
     path: Path
@@ -85,7 +85,7 @@ def _run_part(path: Path) -> Part:
                 data[name][tiling.slices(index)] = values
             present[tiling.slices(index)] = True
             shards[index] = dataclasses.replace(shard, values={})
-    if not present.all() and folder.result.is_file():  # its shards were pruned
+    if not present.all() and folder.result.is_file():  # the shards were pruned
         return _result_part(path, folder.result)
     says_proved = all(shard.undecided is not None for shard in shards.values())
     return Part(path, sweep, record.environment, data, present, shards, says_proved)
@@ -111,18 +111,18 @@ class Merged:
     """Tiles of a joined map, for `sweep.engine.Run`.
 
     Args:
-        parts: two or more.
-        accept_environment_change: whether they may come from different environments.
+        parts: two or more parts.
+        accept_environment_change: whether parts may come from different environments.
 
-    Fields:
-        sweep: of the joined map.
+        Fields:
+            sweep: sweep of the joined map.
 
     Raises:
-        RefusedError: parts that do not fit together, with a line for each reason; or cells that are missing.
+        RefusedError: parts do not fit together, with a line for each reason; or cells are missing.
     """
 
     def __init__(self, parts: Sequence[Part], *, accept_environment_change: bool = False) -> None:
-        """Join in memory; nothing is written."""
+        """Join the parts in memory, without writing anything."""
         _refuse_conflicts(parts, accept_environment_change)
         self._parts = parts
         self.sweep = _joined(parts)
@@ -178,7 +178,7 @@ class Merged:
 
 
 def _undecided(values: dict[str, np.ndarray]) -> int | None:
-    # Number of cells whose answer is not proved, as `maps.grid_map` counts them; None: what tells it is not stored.
+    # Number of cells whose answer is not proved, counted as in `maps.grid_map`; None: it needs quantities not stored.
     if "undecided_fraction" in values:
         return int((values["undecided_fraction"] > 0.0).sum())
     return int(((values["verdict"] & NOT_PROVED) != 0).sum()) if "verdict" in values else None
@@ -204,7 +204,7 @@ def _refuse_conflicts(parts: Sequence[Part], accept: bool) -> None:
 
 
 def _free_axes(parts: Sequence[Part]) -> list[str]:
-    # Axes of which some part has other points than the first.
+    # Axes on which some part has other points than the first part.
     first = parts[0].sweep.grid.axes
     return [
         name
@@ -214,7 +214,7 @@ def _free_axes(parts: Sequence[Part]) -> list[str]:
 
 
 def _fixed(settings: dict[str, Any], free: set[str]) -> dict[str, Any]:
-    # Parts must share these. Other words for equal points are no difference, nor is the shape of the tiles.
+    # Settings that all parts must share, except how axes with equal points are written, and the shape of tiles.
     axes = [name for name in settings["axes"] if name not in free]
     return settings | {"axes": axes, "run": {key: value for key, value in settings["run"].items() if key != "tile"}}
 
@@ -241,7 +241,7 @@ def _agree(values: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _missing_line(missing: list[int], tiling: Tiling) -> str:
-    # Such as "tiles 3:5, 8:9 of 12".
+    # Words such as "tiles 3:5, 8:9 of 12".
     starts = [index for index in missing if index - 1 not in missing]
     ends = [index + 1 for index in missing if index + 1 not in missing]
     ranges = ", ".join(f"{start}:{end}" for start, end in zip(starts[:8], ends, strict=False))

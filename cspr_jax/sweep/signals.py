@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM are noticed at once, whatever is being compiled, by a thread that waits for them.
+"""Handling of Ctrl-C and SIGTERM, which a thread notices at once, even while the main thread compiles.
 
-A run that is interrupted finishes the tile in progress, and keeps it. SIGTERM gives it eight seconds for that, since a
-batch system kills soon after; all else ends within two seconds.
+An interrupted run finishes and keeps the tile in progress. After SIGTERM it has eight seconds for that, since a batch
+system kills it soon after; everything else ends within two seconds.
 """
 
 import contextlib
@@ -15,14 +15,14 @@ from types import FrameType
 from cspr_jax.errors import ExitCode
 
 CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
-# If nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
+# Time for the main thread to end by itself, if nothing must be finished; it cannot while it compiles.
 GRACE_SECONDS = 1.2
-# A tile in progress has so long after SIGTERM.
+# Time for a tile in progress after SIGTERM.
 TILE_SECONDS = 8.0
 FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
 STOPPING = "stopping; Ctrl-C again ends at once"
 TERMINATING = f"SIGTERM: waiting up to {TILE_SECONDS:.0f} s for the tile in progress"
-# Takes the line of a progress display away, and shows the cursor that it hid.
+# Clears the line of a progress display, and shows the cursor that it hid.
 _TIDY = b"\r\x1b[2K\x1b[?25h"
 
 
@@ -30,15 +30,15 @@ class Stop:
     """Request that a run stops.
 
     Fields:
-        code: exit code of the signal, or None.
-        busy: whether something is in progress that is to be finished.
-        at_once: called before the process ends at a second signal.
-        note: likewise, to leave word in a log.
-        tell: called with a line for people when somebody has asked.
+        code: exit code of the signal; None: nobody has requested to stop.
+        busy: whether work is in progress that must be finished.
+        at_once: function that is called before the process ends at a second signal.
+        note: likewise, for an entry in a log.
+        tell: function that is called with a line for the user after the first signal.
     """
 
     def __init__(self) -> None:
-        """Nobody asked yet."""
+        """Begin without a request."""
         self.code: ExitCode | None = None
         self.busy = False
         self.at_once: Callable[[], None] = lambda: None
@@ -49,7 +49,7 @@ class Stop:
         return self.code is not None
 
     def ask(self, number: int, frame: FrameType | None = None) -> None:
-        """Ask to stop; asked again, end the process: what was published stays intact."""
+        """Request to stop; a second request ends the process, which leaves published files intact."""
         del frame
         if self.code is None:
             self.code = CODES[signal.Signals(number)]
@@ -99,23 +99,23 @@ def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[St
 
 
 class Prompt:
-    """Answer to Ctrl-C and SIGTERM while nothing has to be finished.
+    """Response to Ctrl-C and SIGTERM while nothing has to be finished.
 
     Fields:
-        told: whether people know that it was noticed.
+        told: whether the user has been told that the signal was noticed.
         code: exit code of the signal.
     """
 
     def __init__(self) -> None:
-        """Nobody pressed it yet."""
+        """Begin without a signal."""
         self.told, self.code, self._lock = False, ExitCode.INTERRUPTED, threading.Lock()
 
     def tell(self) -> None:
-        """Say that it was noticed, once."""
+        """Tell the user once that the signal was noticed."""
         with self._lock:
             before, self.told = self.told, True
         if not before:
-            with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
+            with contextlib.suppress(OSError, ValueError):  # standard error may be closed
                 signal_name = "SIGTERM: stopped" if self.code is ExitCode.TERMINATED else "interrupted"
                 sys.stderr.write(f"cspr: {signal_name}; nothing half-written is left\n")
                 sys.stderr.flush()
@@ -123,9 +123,9 @@ class Prompt:
 
 @contextlib.contextmanager
 def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
-    """Say at once that Ctrl-C or SIGTERM was noticed, and end the process where KeyboardInterrupt does not do so soon.
+    """Tell at once that Ctrl-C or SIGTERM was noticed, and end the process if KeyboardInterrupt does not do so soon.
 
-    Files get their names only when they are complete, so nothing half-written is left.
+    Files get their names only when they are complete, so that no incomplete files are left.
     """
     prompt, pressed, over = Prompt(), threading.Event(), threading.Event()
     if threading.current_thread() is not threading.main_thread():
@@ -145,7 +145,7 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
         threading.Thread(target=end_unless_over, daemon=True).start()
 
     before = signal.getsignal(signal.SIGTERM)
-    if before is signal.SIG_DFL:  # else somebody has decided
+    if before is signal.SIG_DFL:  # otherwise keep the handler that somebody has set
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with _watched(CODES, on_signal):
@@ -153,7 +153,7 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
     finally:
         signal.signal(signal.SIGTERM, before)
         if last is not None and pressed.is_set():
-            # Other threads may be compiling still: the usual end would wait for them, or take from them what they use.
+            # Skip Python's shutdown, which would wait for threads that compile, or remove objects that they use.
             with contextlib.suppress(OSError, ValueError):
                 sys.stdout.flush()
             last()
@@ -163,8 +163,8 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
 
 @contextlib.contextmanager
 def _watched(numbers: Collection[int], handle: Callable[[int], None]) -> Iterator[None]:
-    # Python runs handlers when the main thread is back from what it has called, which may be a minute of compiling.
-    # It writes the number of a signal to this pipe at once, where another thread reads it.
+    # Python runs handlers only when the main thread returns from compiled code, which may be after a minute. But it
+    # writes the number of a signal to this pipe at once, where another thread reads it.
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
 

@@ -1,4 +1,4 @@
-"""One tile of a sweep: its numbers, computed and checked."""
+"""Computation and check of a tile of a sweep."""
 
 import functools
 import pickle
@@ -15,15 +15,15 @@ from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
 
-# Margins so near zero can change sign with the processor; the result holds their number.
+# Margins this close to zero may have another sign on another processor; results contain the number of such cells.
 NEAR_ZERO = 1e-9
 
 
 class TileMap:
-    """The map of a sweep, ready to compute its tiles.
+    """The map of a sweep, prepared to compute its tiles.
 
     Raises:
-        ConfigError: its robot, amplitude function or limits cannot be used, or nothing in its grid can be reached.
+        ConfigError: robot, amplitude function or limits cannot be used, or nothing in the grid can be reached.
     """
 
     def __init__(self, sweep: Sweep) -> None:
@@ -47,7 +47,7 @@ class TileMap:
                 ) from error
             raise
         _refuse(index, self._cells.contradictions(answers))
-        # Counts and flags fit their small types: max_arcs is at most 1000.
+        # Counts and flags fit into their small types, since max_arcs is at most 1000.
         values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
         this_environment = environment()
         undecided = self._cells.undecided(answers)
@@ -61,7 +61,7 @@ def _near_zero(answers: dict[str, np.ndarray]) -> int:
 
 
 def _refuse(index: int, contradictions: dict[str, np.ndarray]) -> None:
-    # Contradictions come from a broken processor, driver or compiler.
+    # Contradictions mean that a processor, driver or compiler is faulty.
     for error, cells in contradictions.items():
         if cells.any():
             raise SelfCheckError(
@@ -76,5 +76,5 @@ def _tile_map(pickled: bytes) -> TileMap:
 
 
 def compute_tile(pickled: bytes, index: int) -> Computed:
-    """Compute a tile in a process that may not know the sweep yet."""
+    """Compute a tile in a worker process, which unpickles the sweep at its first tile."""
     return _tile_map(pickled)(index)

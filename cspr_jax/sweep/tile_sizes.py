@@ -1,7 +1,7 @@
-"""Number of cells of a tile, by what they cost.
+"""Number of cells of a tile, by the cost of cells.
 
-A killed run loses at most a tile, and a run is silent for as long as a tile takes. The costs are a table that was
-measured once: the shape of the tiles is part of a sweep's identity, which must be the same on every machine.
+A killed run loses at most a tile, and a run reports nothing while a tile is computed. Costs come from a table that was
+measured once, since the shape of tiles is part of a sweep's identity, which must be the same on every machine.
 """
 
 import math
@@ -11,16 +11,17 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.map_kinds import MapKind
 from cspr_jax.sweep.checks import is_given
 
-# Seconds of a tile on one core; two cores need half of it, a slow core twice as much.
+# Time for a tile on one core, s; two cores need half of it, a slow core twice as much.
 TILE_SECONDS = 40.0
-# A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and
+# Smallest number of tiles of a run, unless each would take less than a few seconds: tiles pad their last batches, and
 # even a small tile of a platform's poses takes half a second.
 FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
-# Seconds that uncertainty takes a cell with 30 arcs, before what `CellCost` says of a kind of map.
+# Additional time for a cell with 30 arcs and an uncertainty, s; `CellCost` has factors for kinds of maps.
 UNCERTAINTY_SECONDS = 1e-2
-# Likewise for a workspace, by what else is computed for each cell.
+# Additional times for a cell of a workspace, s, by further computations.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
-# Likewise for motions among obstacles, by how many there are: each motion that is feasible without them is proved.
+# Additional times for motions among obstacles, s, for each proof and each obstacle: all motions that are feasible
+# without obstacles are proved.
 PROOF_SECONDS, OBSTACLE_SECONDS = 5e-3, 1e-3
 ARCS = 30
 

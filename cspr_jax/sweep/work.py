@@ -13,8 +13,8 @@ class Computed:
     """A tile, and the environment that computed it.
 
     Fields:
-        shard: its content.
-        environment: of the process that computed it.
+        shard: content of the tile.
+        environment: environment of the process that computed it.
     """
 
     shard: Shard
@@ -36,7 +36,7 @@ class Executor(Protocol):
         """Compute tiles.
 
         Args:
-            stop: when it is set, tiles in progress are finished and no other one is begun.
+            stop: request to stop, after which tiles in progress are finished and no others are begun.
 
         Yields:
             the tiles.

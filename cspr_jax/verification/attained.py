@@ -1,8 +1,8 @@
-"""Smallest slacks that a proved motion attains, and when: minima within the blocks that the proof leaves for them.
+"""Smallest slacks that a motion attains, and their times: minima within the blocks that a proof leaves for them.
 
-The proof bounds each smallest slack and says which blocks may hold it. States at single times within these, at their
-ends and on both sides of joints say what is attained; the best of them are followed until the time is known to a
-millionth of the duration, and better.
+The proof bounds each smallest slack and gives the blocks that may contain it. Samples within these blocks, at their
+ends and on both sides of joints give attained slacks; the search is refined around the smallest samples until the time
+is known to a millionth of the duration or better.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ from cspr_jax.verification.criteria import levels
 from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
-STARTS, FOLLOWED = 6, 2  # samples that are followed for each criterion, in the first round and in further ones
+STARTS, FOLLOWED = 6, 2  # numbers of samples for each criterion around which the first, and further rounds refine
 ROUNDS = 7  # rounds of sampling, each eight times as fine as the one before
 # Largest number of blocks that are sampled for a criterion: those with the smallest upper bounds.
 MOST_BLOCKS = 1000
@@ -32,9 +32,9 @@ Slacks = Callable[[np.ndarray], np.ndarray]
 def with_attained(
     problem: Problem, answers: AnyAnswers, motions: Sequence[Motion], scene: Scene | None = None
 ) -> AnyAnswers:
-    """Answers with a proof of every segment that is not feasible, and in each proof what its motion attains.
+    """Answers with a proof of every segment that is not feasible, with attained slacks instead of upper bounds.
 
-    Margins of proofs are those that motions attain, too.
+    Margins of proofs are attained ones, too.
     """
     proofs = np.array(answers.proof)
     for i, motion in enumerate(motions):
@@ -54,7 +54,7 @@ def with_attained(
 
 
 def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None) -> MotionProof:
-    """A proof whose smallest slacks, and their times, are those that the motion attains."""
+    """The proof with smallest slacks, and times, that the motion attains."""
     proof, duration = case.proof, float(motion.duration())
     columns = _nearest(case)
     if proof.near is None or not len(columns) or not np.isfinite(duration):
@@ -66,10 +66,10 @@ def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
         bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
         return block_slacks(*bounds, contacts_alone=case.contacts_alone).high[None, :, columns]
 
-    columns = columns[columns < proof.near.slacks.low.shape[1]]  # feeds come last, from another proof
+    columns = columns[columns < proof.near.slacks.low.shape[1]]  # the last columns are feeds, from another proof
     smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))
     high, when = proof.high.copy(), proof.when.copy()
-    # A limit that is touched between two neighbouring floats is proved to be touched, but no sample attains it.
+    # A limit may be touched between two neighbouring floats, where no sample attains it.
     level = levels(case.criteria)[columns]
     is_seen = np.isfinite(smallest) & ~((high[columns] < level) & (smallest >= level))
     high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
@@ -77,7 +77,7 @@ def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
 
 
 def _nearest(case: MotionProof) -> np.ndarray:
-    # Criteria that may be the worst ones of their flags.
+    # Criteria that may have the smallest slack of all with their flag.
     low, high = (side / case.scales for side in (case.proof.low, case.proof.high))
     flags = np.array([row.flag.value for row in case.criteria])
     minimum = np.array([high[flags == flag].min() for flag in flags])
@@ -85,7 +85,7 @@ def _nearest(case: MotionProof) -> np.ndarray:
 
 
 def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    # Starts and ends (2, k) of the blocks to sample, tau, and the criteria (k, m) whose smallest slack each may hold.
+    # Starts and ends (2, k) of the blocks to sample, tau, and the criteria (k, m) whose smallest slacks they may hold.
     may_hold = near.slacks.low[:, columns] <= high[columns]
     upper = np.where(may_hold, near.slacks.high[:, columns], np.inf)
     for column in np.flatnonzero(may_hold.sum(0) > MOST_BLOCKS):
@@ -95,12 +95,12 @@ def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: f
 
 
 def _minima(slacks: Slacks, blocks: tuple[np.ndarray, np.ndarray], joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest slack of each of m criteria, and its tau, by samples of blocks and then around the best ones.
+    # Smallest slack of each of m criteria, and its tau, from samples in blocks and then around the smallest ones.
     edges, may_hold = blocks
     inner = joints[(np.searchsorted(edges[0], joints, "right") > np.searchsorted(edges[1], joints))]
     knots = np.unique(np.concatenate([*edges, inner, inner * (1.0 - BESIDE)]))
     tau = np.clip(np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])])), 0.0, 1.0)
-    # Samples in blocks that cannot hold the smallest slack of a criterion, and between blocks, do not count for it.
+    # For each criterion, ignore samples between blocks, and in blocks that cannot contain its smallest slack.
     inside = np.zeros((len(tau) + 1, len(may_hold[0])), int)
     np.add.at(inside, np.searchsorted(tau, edges[0]), may_hold)
     np.subtract.at(inside, np.searchsorted(tau, edges[1], side="right"), may_hold)

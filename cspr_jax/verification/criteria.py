@@ -4,11 +4,11 @@ In natural units (N, m, m/s, m/s^2), with n cables:
 
     tension     of n = dof cables: n distances of the tensions from their limits; of more: the largest distance that all
                 tensions together can have from their limits
-    limits      one for each cable, of the floor one, for each limit that is given
-    regular     of a platform on n = dof cables: size of the normalised determinant less what counts as singular
-    below       of a point mass or a rigid platform on n = dof cables: depth below the plane of the spools
+    limits      for each limit that is given: one for each cable, or a single one
+    regular     of a platform on n = dof cables: magnitude of the normalised determinant less what counts as singular
+    below       of a point mass or a rigid platform on n = dof cables: depth below the spool plane
     contacts    of all bodies that can meet: clearance of their surfaces, `robots.bounds.contact_bounds`
-    floor       of a platform, where there is one: height above it of the lowest of its attachment points, and of the
+    floor       of a platform, where a floor is given: height above it of the lowest of attachment points, and of the
                 corners of its shape, if that is known
 """
 
@@ -30,7 +30,7 @@ from cspr_jax.robots.statics.wrench_balance import SINGULAR
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
 
-# Patterns of the robots that have to stay below their spools.
+# Patterns of robots that must stay below their spools.
 BELOW = ("2T", "3T", RIGID)
 FLAGS = {
     "cables": Verdict.CABLE_CABLE,
@@ -38,7 +38,7 @@ FLAGS = {
     "obstacle": Verdict.OBSTACLE,
     "platform-obstacle": Verdict.OBSTACLE,
 }
-# Flags of what can happen at a single time.
+# Flags of criteria that can fail at a single time.
 AT_TIMES = (Verdict.SINGULAR, *FLAGS.values())
 
 
@@ -46,13 +46,13 @@ class Criterion(NamedTuple):
     """Criterion of a slack.
 
     Fields:
-        flag: the verdict where it is broken; of the tensions of redundant cables `WRENCH_INFEASIBLE`.
-        cables: numbers from 0 on: of one cable, of two that meet, or none.
-        unit: of the slack.
-        obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
-        allowed: the least, or the most, that the quantity may be.
-        sense: whether it must be at least or at most so large.
-        allowance: by how much the quantity may miss it, since limits may be touched.
+        flag: flag of verdicts where it fails; for tensions of redundant cables `WRENCH_INFEASIBLE`.
+        cables: indices of one cable, of two that meet, or none.
+        unit: unit of the slack.
+        obstacle: index of the obstacle; None: no obstacle is concerned.
+        allowed: smallest or largest value that is allowed.
+        sense: whether `allowed` is a lower ("least") or an upper ("most") limit.
+        allowance: amount by which the quantity may exceed it, since limits may be touched.
     """
 
     flag: Verdict
@@ -64,7 +64,7 @@ class Criterion(NamedTuple):
     allowance: float = 0.0
 
     def value(self, slack: float) -> float:
-        """Value of the quantity that is bounded."""
+        """Value of the bounded quantity, from its slack."""
         return self.allowed + slack if self.sense == "least" else self.allowed - slack
 
 
@@ -73,7 +73,7 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
     numbers = range(robot.n_cables)
     low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
     if robot.n_cables > robot.dof:
-        # One number says by how much all tensions together miss their limits.
+        # A single slack for all tensions together.
         rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N", allowance=TOUCHED * min(low))]
     else:
         rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k], allowance=TOUCHED * low[k]) for k in numbers]
@@ -99,12 +99,12 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
 
 
 def levels(rows: Sequence[Criterion]) -> np.ndarray:
-    """Slacks above which criteria are met, and below which they are broken, (n_criteria,) in their units."""
+    """Slacks above which criteria are met, and below which they fail, (n_criteria,) in their units."""
     return np.array([-row.allowance for row in rows])
 
 
 def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
-    """Criteria of bodies that can meet: the last of all criteria."""
+    """Criteria of contacts and of the floor, the last ones of all."""
     rows, around = [], scene or default_scene(robot)
     for kind, cable, other in contact_pairs(robot, around):
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
@@ -116,7 +116,7 @@ def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None
 
 
 def has_extent(robot: AnyRobot, scene: Scene) -> bool:
-    """Tell whether a robot has points beside its mass centre that must be above a floor."""
+    """Tell whether points of a robot other than its mass centre must be above a floor."""
     return isinstance(robot, PlatformRobot) or scene.body is not None
 
 

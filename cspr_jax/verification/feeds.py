@@ -1,4 +1,4 @@
-"""Feeds: largest speeds of the mass centre that hold over some pieces of a motion alone, such as those of G-code."""
+"""Feeds: largest speeds of the mass centre on single pieces of a motion, such as in G-code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cspr_jax.verification.time_proof import TimeProof, time_proof
 
 
 def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, TimeProof]:
-    """Proof that a motion keeps its feeds; without one, the slack counts as the largest feed."""
+    """Proof that a motion keeps its feeds; on pieces without a feed the slack is the largest feed."""
     knots, largest = np.asarray(motion.knots), float(feeds[np.isfinite(feeds)].max())
 
     def slacks(start: np.ndarray, end: np.ndarray) -> BlockSlacks:

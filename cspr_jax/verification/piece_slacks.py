@@ -18,11 +18,11 @@ from cspr_jax.verification.bounds.block_slacks import BATCH, block_slacks
 from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, radii_of
 
-# Half the length of short blocks over the usual one.
+# Half of the length of short blocks, over a usual length.
 SHORT = 1e-6
 LOOSE = 0.5  # bounds of a piece are close if they differ by less than this fraction of the violation,
 SMALLEST = 1e-7  # or by less than this in the unit of the slack
-HALVINGS = 5  # of a piece, at most
+HALVINGS = 5  # largest number of halvings of a piece
 Sides = tuple[np.ndarray, np.ndarray]
 
 
@@ -31,7 +31,7 @@ class PieceSlacks(NamedTuple):
 
     Fields:
         rows: the criteria.
-        low: (n_pieces, n_criteria) lower bounds, in their units.
+        low: (n_pieces, n_criteria) lower bounds, in units of the criteria.
         high: (n_pieces, n_criteria) upper bounds.
     """
 
@@ -43,13 +43,13 @@ class PieceSlacks(NamedTuple):
 def piece_slacks(
     problem: Problem, motion: BoundedMotion, knots: Float[np.ndarray, "n_pieces+1"], scene: Scene | None
 ) -> PieceSlacks:
-    """Bounds of the slacks over pieces, close where they are negative; of all robots within an uncertainty."""
+    """Bounds of the slacks over pieces, for all robots within an uncertainty; close where they are negative."""
 
     def bounded(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
         if problem.limits.uncertainty is None:
             return slacks.low, slacks.high
-        # Lower bounds for all robots in the middle of a block are close to the smallest slack of these robots.
+        # In the middle of a block, lower bounds for all robots are close to the smallest slack of these robots.
         middles = motion.bounds(*short_blocks(0.5 * (start + end), end - start))
         low, high = (all_robots_slacks(problem, states) for states in (motion.bounds(start, end), middles))
         return _first_less(slacks.low, low), _first_less(slacks.high, high)
@@ -65,12 +65,12 @@ def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1
 
 
 def short_blocks(times: Float[np.ndarray, "k"], lengths: Float[np.ndarray, "k"]) -> Sides:
-    """Blocks that are so short that bounds over them are nearly exact."""
+    """Blocks that are short enough for nearly exact bounds."""
     return times - SHORT * lengths, times + SHORT * lengths
 
 
 def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
-    # Slacks whose first columns are replaced by others where these are smaller.
+    # Replace the first columns of slacks by others where these are smaller.
     count = others.shape[1]
     return np.concatenate([np.minimum(slacks[:, :count], others), slacks[:, count:]], axis=1)
 
@@ -78,7 +78,7 @@ def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
 def close_bounds(
     bounded: Callable[[np.ndarray, np.ndarray, np.ndarray], Sides], ends: Sides, smallest: float, halvings: int
 ) -> Sides:
-    """Bounds of the smallest slacks over pieces, which are halved where a negative lower bound is not close."""
+    """Bounds of the smallest slacks over pieces, which are halved while negative lower bounds are not close."""
     start, end = ends
     piece, bounds = np.arange(len(start)), None
     for level in range(halvings + 1):

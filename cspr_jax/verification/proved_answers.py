@@ -1,4 +1,4 @@
-"""Answers of motions that give bounds of their states: proved or refuted over their whole time, in natural units."""
+"""Answers of motions with bounds of their states, proved or refuted over the full duration, in natural units."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cspr_jax.verification.criteria import AT_TIMES, Criterion, contact_criteria
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
-# Intervals between samples of a motion that is only sampled.
+# Number of intervals between samples of a motion without bounds.
 SAMPLES = 2000
 ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
@@ -36,13 +36,13 @@ class MotionProof(NamedTuple):
     """Proof of one motion.
 
     Fields:
-        criteria: of a robot within its limits.
-        proof: of the same criteria.
-        scales: (n_criteria,) divisors with which slacks of different criteria are compared, in their units.
-        obstacles: their names.
-        feeds: (pieces,) largest speed of the mass centre in each piece of the motion, m/s, inf for none; None: there
-            are none.
-        contacts_alone: whether only contacts are proved, of a motion whose family proves the rest.
+        criteria: criteria of the robot within its limits.
+        proof: proof of these criteria.
+        scales: (n_criteria,) divisors that make slacks of different criteria comparable, in their units.
+        obstacles: names of the obstacles.
+        feeds: (pieces,) largest speed of the mass centre on each piece of the motion, m/s, inf without a feed; None:
+            there are no feeds.
+        contacts_alone: whether only contacts are proved, since the family of the motion proves the rest.
     """
 
     criteria: tuple[Criterion, ...]
@@ -85,12 +85,12 @@ class MotionProof(NamedTuple):
         return self.smallest(self.proof.low, TENSIONS)
 
     def smallest(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
-        """Smallest of the bounds of some criteria."""
+        """Smallest bound of the criteria that have, or do not have, some flags."""
         chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
         return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
 
     def with_feeds(self, motion: Any, feeds: np.ndarray | None) -> "MotionProof":
-        """The proof of a motion of pieces that has to keep feeds, too."""
+        """The proof, extended by feeds that a motion of pieces must keep."""
         if feeds is None or not np.isfinite(feeds).any():
             return self
         from cspr_jax.verification.feeds import feed_proof
@@ -115,7 +115,7 @@ class MotionProof(NamedTuple):
 
     @property
     def failing_by_criterion(self) -> dict[str, list[list[float]]]:
-        """Intervals in which criteria fail, by the names of their flags, [start, end] s each."""
+        """Intervals [start, end] in which criteria fail, s, by the names of their flags."""
         parts: dict[str, list[np.ndarray]] = {}
         for row, intervals in zip(self.criteria, self.proof.failing, strict=True):
             if len(intervals):
@@ -128,9 +128,9 @@ class MotionProof(NamedTuple):
         return {"failing": self.failing.tolist(), "failing_by_criterion": self.failing_by_criterion}
 
     def causes(self, frame: Frame, flags: Verdict) -> tuple[Cause, ...]:
-        """The worst cable of each criterion that some flags name, the worst one first; see `SegmentProof`.
+        """The worst cable of each criterion with one of some flags, in order of severity; see `SegmentProof`.
 
-        Where they name none, the criteria that fail; where none does, the one nearest to it, as undecided.
+        If the flags name no criterion, take those that fail; if none fails, the one with the smallest slack, undecided.
         """
         order = np.argsort((self.proof.high - levels(self.criteria)) / self.scales).tolist()
         chosen = [k for k in order if self.criteria[k].flag & flags] or [k for k in order if self.broken[k]]
@@ -139,7 +139,7 @@ class MotionProof(NamedTuple):
         worst = {self.criteria[k].flag: k for k in reversed(chosen)}
         named, unbounded = list(dict.fromkeys(self.criteria[k].flag for k in chosen)), list[Verdict]()
         if Verdict.ABOVE_SPOOLS in worst:
-            # The spools come first: tensions grow without bound towards their plane.
+            # Passing the spool plane comes first, since tensions grow without bound towards it.
             named.sort(key=lambda flag: flag != Verdict.ABOVE_SPOOLS)
             unbounded = [flag for flag in named if flag & TENSIONS]
         bounded = [flag for flag in named if flag not in unbounded]
@@ -147,7 +147,7 @@ class MotionProof(NamedTuple):
 
 
 def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
-    """A criterion of a proof as a cause."""
+    """Cause from a criterion of a proof."""
     row, proof = case.criteria[k], case.proof
     needed, allowed = row.value(float(proof.high[k])), row.allowed
     if row.flag == Verdict.BELOW_FLOOR:
@@ -159,7 +159,7 @@ def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
 def proved_answers(
     problem: Problem, motions: Sequence[Any], scene: Scene | None = None, feeds: Sequence[np.ndarray | None] = ()
 ) -> Answers:
-    """Answers of motions, by bounds of their states; a motion that gives none is sampled."""
+    """Answers of motions from bounds of their states; motions without bounds are sampled."""
     proofs = [proof_of(problem, motion, scene) for motion in motions]
     for i, speeds in enumerate(feeds):
         proofs[i] = proofs[i].with_feeds(motions[i], speeds)
@@ -186,7 +186,7 @@ def proof_of(
     contacts_alone: bool = False,
     intervals: bool = True,
 ) -> MotionProof:
-    """Proof of one motion; samples refute one that gives no bounds, or has no duration."""
+    """Proof of one motion; a motion without bounds or duration can only be refuted, by samples."""
     if not hasattr(motion, "bounds") or not np.isfinite(float(motion.duration())):
         return sampled_proof(problem, motion, scene, contacts_alone=contacts_alone)
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
@@ -216,7 +216,7 @@ def proofs_of(
         of_motion = partial(bounds, motion)
         return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, contacts_alone=contacts_alone)
 
-    # Answers name only the nearest contact of each kind.
+    # Answers name only the nearest contact of each kind, so that others need not be bounded closely.
     names = [(row.flag, () if row.flag in AT_TIMES else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), intervals=intervals)
@@ -273,13 +273,13 @@ def sampled_proof(
 ) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 
-    A motion whose duration is not finite is sampled at rest along its path; all samples have the time of the start.
+    A motion whose duration is not finite is sampled at rest along its path, with the time of the start.
     """
     tau, duration = np.linspace(0.0, 1.0, samples + 1), float(motion.duration())
     states, times = states_as_bounds(motion, tau), tau * duration
     if not np.isfinite(duration):
         states, times = at_rest(states), np.where(tau > 0.0, np.nan, 0.0)
-    # A block without a length has the slacks at its time.
+    # Blocks of length zero have the slacks at single times.
     high = block_slacks(
         problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
     ).high
@@ -305,7 +305,7 @@ def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    # First and last times of runs of flags, (m, 2), where times are known.
+    # First and last times of runs of true flags, (m, 2); none where times are not known.
     if np.isnan(times[-1]):
         return np.empty((0, 2))
     edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
@@ -313,7 +313,7 @@ def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
 
 
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
-    # Slacks of tensions are over weight / n_cables, of lengths over the robot's radius, others over the allowed value.
+    # Scales are weight / n_cables for tensions, the robot's radius for lengths, and the allowed value for others.
     robot = problem.robot
     weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
     of_unit = {"N": weight, "m": radius, "1": 1.0}

@@ -1,4 +1,4 @@
-"""Verdicts that rest on a proof, whatever the trajectory family."""
+"""Verdicts that rest on a proof, for several trajectory families."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.shapes import Float
 
-# A motion may touch a limit if the slack is below this.
+# A motion with a slack below this may touch a limit.
 NEARLY = 1e-4
-# Limits on speeds, whose proved slacks are those of the squares.
+# Limits of speeds, whose slacks are proved for the squares of speeds.
 SPEEDS = ("cable_speed_max", "speed_max")
 
 
@@ -22,10 +22,10 @@ class Verdicts:
 
     Fields:
         verdict: flags of `Verdict`; 0 if proved.
-        margin: smallest slack of taut cables that is attained: for lines a distance from facets, m/s^2; for Bezier
-            segments a number without a unit, which includes the depth below the spools.
+        margin: smallest attained slack of taut cables: for lines a distance from facets, m/s^2; for Bezier segments a
+            dimensionless number, which includes the depth below the spools.
         bound: proved lower bound of the margin.
-        limit_margin: smallest slack of the limits, without a unit; inf without limits.
+        limit_margin: smallest slack of the limits, dimensionless; inf without limits.
     """
 
     verdict: np.ndarray
@@ -42,7 +42,7 @@ class Verdicts:
 def with_touched(
     problem: Problem, strict: Verdicts, verdicts_of: Callable[[Problem, np.ndarray], Verdicts]
 ) -> Verdicts:
-    """Verdicts; motions that may touch a limit get those by the wider limits of proofs. Margins stay."""
+    """Verdicts, by wider limits for motions that may touch a limit; margins do not change."""
     rows = np.flatnonzero((strict.verdict != 0) & (np.abs(strict.limit_margin) < NEARLY))
     if len(rows):
         strict.verdict[rows] = verdicts_of(touchable(problem), rows).verdict
@@ -52,5 +52,5 @@ def with_touched(
 def plain_slack(
     name: str, values: Float[np.ndarray, "..."], squared: tuple[str, ...] = SPEEDS
 ) -> Float[np.ndarray, "..."]:
-    """Slack of a limit as results show it."""
+    """Slack of a limit in the form of results."""
     return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name in squared else values

@@ -1,4 +1,4 @@
-"""Smallest numbers, such as those of arcs, whose motions are proved: tried in increasing order, for many motions."""
+"""Smallest numbers, such as of arcs, whose motions are proved, tried in increasing order for many motions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from cspr_jax.numerics.shapes import Int
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Takes indices (m,) of motions, and the smallest number to try for each. Returns the number that was tried, which may
-# be larger, or `NONE` without one; and the verdict.
+# A function of indices (m,) of motions, and of the smallest number to try for each. It returns the number that was
+# tried, which may be larger, or `NONE`; and the verdict.
 Trial = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 NONE = -1
 FEWER = FLAGS(Verdict.FEWER_ARCS_UNDECIDED)
@@ -22,8 +22,8 @@ class Smallest(NamedTuple):
     """Smallest numbers of n motions.
 
     Fields:
-        number: (n,) the smallest number that is proved; NONE: none is.
-        undecided: (n,) the smallest number, up to that, for which it or a smaller one stayed undecided; NONE: none.
+        number: (n,) smallest number that is proved; NONE: there is none.
+        undecided: (n,) smallest number up to `number` that stayed undecided; NONE: there is none.
     """
 
     number: np.ndarray
@@ -33,7 +33,7 @@ class Smallest(NamedTuple):
 def smallest_proved(
     trial: Trial, first: Int[np.ndarray, "n"], *, step: int, last: Int[np.ndarray, "n"] | int
 ) -> Smallest:
-    """Smallest proved numbers from first ones, with a step, to last ones."""
+    """Smallest proved numbers among those from a first to a last number, in steps."""
     lower, last = np.array(first), np.broadcast_to(last, np.shape(first))
     number, undecided = np.full(len(lower), NONE), np.full(len(lower), NONE)
     is_open = lower <= last

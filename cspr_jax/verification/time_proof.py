@@ -1,9 +1,9 @@
-"""Proof of any motion over its whole time: blocks are cut until each criterion is decided on each of them.
+"""Proof of any motion over its full duration: blocks of time are cut until each criterion is decided on all of them.
 
-A criterion has a level: zero or, for limits, which may be touched, a little less. It is met throughout a block if the
-lower bound of its slack is above the level, and broken throughout if the upper bound is below it. What is left when
-blocks are as short as the resolution are the ends of intervals in which a criterion fails, or times that are undecided.
-Open blocks of all motions are bounded together.
+The level of a criterion is zero or, for limits, which may be touched, a little less. A criterion is met throughout a
+block if the lower bound of its slack is above the level, and fails throughout if the upper bound is below it. Blocks
+that are still open at the resolution are ends of intervals in which a criterion fails, or undecided times. Open blocks
+of all motions are bounded together.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.verification.bounds.block_parts import TimeBlocks, joined
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 
-FIRST = 32  # blocks at the start
-# Bounds of the smallest slack are narrowed to this fraction of it, or of a tenth of the usual slack if that is larger.
+FIRST = 32  # number of blocks at the start
+# Bounds of the smallest slack are narrowed to this fraction of that slack, or of a tenth of the median if it is larger.
 CLOSE = 0.002
-# Largest numbers of blocks of one motion: to decide criteria, and to narrow margins.
+# Largest numbers of blocks of a motion for deciding criteria, and for narrowing margins.
 MAX_BLOCKS, NARROWING = 100_000, 4_000
 # Blocks that narrow a margin are no shorter than this fraction of the resolution.
 SHORTEST = 1e-3
@@ -29,17 +29,17 @@ SHORTEST = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class TimeProof:
-    """Bounds of n_criteria over a motion, and where it breaks them.
+    """Bounds of the slacks of criteria over a motion, and intervals in which criteria fail.
 
     Fields:
-        low: (n_criteria,) lower bound of each slack over the whole motion.
+        low: (n_criteria,) lower bound of each slack over the full motion.
         high: (n_criteria,) upper bound of the smallest slack.
-        when: (n_criteria,) a time within the block at which that bound was found, s.
-        failing: for each criterion (m, 2) intervals of time in which it fails throughout, s; as wide as is proved.
-        open: for each criterion (m, 2) intervals, none longer than the resolution unless blocks ran out, that are
-            undecided.
+        when: (n_criteria,) a time within the block that gives `high`, s.
+        failing: for each criterion (m, 2) intervals of time in which it is proved to fail throughout, s.
+        open: for each criterion (m, 2) undecided intervals, s; none is longer than the resolution unless the largest
+            number of blocks was reached.
         blocks: number of blocks that were bounded.
-        near: blocks that may hold the smallest slack of some criterion; None: not known.
+        near: blocks that may contain the smallest slack of some criterion; None: not known.
     """
 
     low: np.ndarray
@@ -58,7 +58,7 @@ def time_proof(
     jumps: np.ndarray | None = None,
     level: np.ndarray | float = 0.0,
 ) -> TimeProof:
-    """Decide criteria over a whole motion."""
+    """Decide criteria over a full motion."""
     at_jumps = [] if jumps is None else [jumps]
     return time_proofs(
         lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps, level=level
@@ -75,7 +75,7 @@ def time_proofs(
     level: np.ndarray | float = 0.0,
     intervals: bool = True,
 ) -> list[TimeProof]:
-    """Decide criteria over several whole motions at once."""
+    """Decide criteria over several full motions at once."""
     count = len(durations)
     if not count:
         return []
@@ -102,7 +102,7 @@ def time_proofs(
 
 
 def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, full: BlockSlacks | None) -> TimeBlocks:
-    # A part has no looser bounds than the whole.
+    # Bounds of a block also hold for its parts: keep the tighter ones.
     if full is not None and not len(start):
         return TimeBlocks(motion, start, end, full)
     blocks = TimeBlocks(motion, start, end, slacks(motion, start, end).complete())
@@ -115,7 +115,7 @@ def _usual(high: np.ndarray, count: int) -> np.ndarray:
 
 
 def _smallest(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    # Smallest values of each motion, (count, n_criteria), inf for a motion without any.
+    # Smallest values of each motion, (count, n_criteria); inf for motions without values.
     minimum = np.full((count, values.shape[1]), np.inf)
     if len(motion):
         order = np.argsort(motion, kind="stable")
@@ -132,13 +132,13 @@ def _narrowed(
     jumps: np.ndarray,
     groups: np.ndarray | None,
 ) -> tuple[TimeBlocks, np.ndarray]:
-    # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
+    # Cut blocks that may contain the smallest slack of a criterion until its bounds are close; count the new blocks.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
     minimum = _grouped(_smallest(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
-        # Use the usual magnitude of slacks, too: near zero no fraction of the smallest one could be reached.
-        with np.errstate(invalid="ignore"):  # of bounds that are infinite
+        # Use the usual magnitude of slacks too, since bounds of a slack near zero cannot reach a relative accuracy.
+        with np.errstate(invalid="ignore"):  # about infinite bounds
             level = (minimum - CLOSE * np.fmax(np.abs(minimum), 0.1 * usual))[blocks.motion]
         matters = (blocks.slacks.low < level) & np.isfinite(level)
         is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
@@ -154,7 +154,7 @@ def _narrowed(
 
 
 def _grouped(values: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
-    # The smallest value of the group of each column.
+    # For each column, the smallest value of its group.
     if groups is None or not len(groups):
         return values
     smallest = np.full((len(values), int(groups.max()) + 1), np.inf)
@@ -171,14 +171,14 @@ def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
         near = blocks.take(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
-        near = near._replace(motion=np.zeros_like(near.motion))  # the one motion of its proof
+        near = near._replace(motion=np.zeros_like(near.motion))  # the proof is of a single motion
         sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
         proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))
     return proofs
 
 
 def _merged(blocks: TimeBlocks, flags: np.ndarray, count: int) -> list[np.ndarray]:
-    # Join neighbouring blocks of one motion to intervals, (m, 2) for each motion.
+    # Join neighbouring blocks of a motion to intervals, (m, 2) for each motion.
     is_next = np.diff(blocks.motion, prepend=-1) == 0
     before, after = np.append(False, flags[:-1]) & is_next, np.append(flags[1:] & is_next[1:], False)
     firsts, lasts = np.flatnonzero(flags & ~before), np.flatnonzero(flags & ~after)

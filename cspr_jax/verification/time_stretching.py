@@ -1,9 +1,9 @@
 """Least uniform stretching of time with which a motion is feasible.
 
-Stretched by c, velocities are divided by c and accelerations by c^2, so that what the cables must supply is affine in
-u = 1 / c^2. Means of tensions within limits for two values of u are such tensions for values between them: at every
-time the feasible u are an interval, and so they are for a complete motion. The smallest distance of tensions from
-their limits is concave in u, and speeds and accelerations of cables only fall: a search along u finds a feasible
+Stretching by c divides velocities by c and accelerations by c^2, so that the wrench that cables must supply is affine
+in u = 1 / c^2. Weighted means of feasible tensions for two values of u are feasible for values between them: at every
+time the feasible u form an interval, and so they do for the full motion. The smallest distance of tensions from their
+limits is concave in u, and speeds and accelerations of cables decrease with c: a search along u finds a feasible
 stretching if there is one.
 """
 
@@ -20,12 +20,12 @@ STEPS, GOLDEN = 40, 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Stretching(NamedTuple):
-    """Answer to a search for the least stretching.
+    """Result of a search for the least stretching.
 
     Fields:
-        factor: by which durations grow, proved feasible; NaN: none was found.
-        proof: of the motion that is so stretched; of the one that comes nearest where none is feasible.
-        is_static: whether the path is proved feasible at rest everywhere, so that some stretching is feasible.
+        factor: factor of durations that is proved feasible; NaN: none was found.
+        proof: proof of the stretched motion; if none is feasible, of the one with the largest margin.
+        is_static: whether the path is proved feasible at rest at all points, so that some stretching is feasible.
     """
 
     factor: float
@@ -34,7 +34,7 @@ class Stretching(NamedTuple):
 
 
 def least_stretching(proved: Callable[[float], MotionProof]) -> Stretching:
-    """Find the least stretching that is proved feasible; at one shorter by `CLOSE` nothing is proved."""
+    """Find the least stretching that is proved feasible, to a relative error of `CLOSE`."""
     first = proved(1.0)
     if first.is_feasible:
         return Stretching(1.0, first, is_static=False)
@@ -66,7 +66,7 @@ def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof
 
 
 def _any_feasible(proved: Callable[[float], MotionProof], slowest: MotionProof) -> tuple[float, MotionProof] | None:
-    # Criteria other than tensions stay broken if they are so at rest. Otherwise the worst slack has one maximum over u.
+    # Criteria other than tensions that fail at rest fail for all u. Else the worst slack has a single maximum over u.
     if any(
         is_broken and not row.flag & TENSIONS for row, is_broken in zip(slowest.criteria, slowest.broken, strict=True)
     ):

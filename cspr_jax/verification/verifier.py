@@ -1,8 +1,8 @@
-"""Motions of families that ignore contacts and pulleys, proved with both: smallest numbers of arcs.
+"""Proofs, with contacts and pulleys, of motions whose families ignore both, and smallest numbers of arcs.
 
-The family makes its motions for cables that leave from points and meet nothing. Among obstacles, or with the shape of a
-platform, contacts alone are then proved, since the family has proved the rest; over pulleys, everything is. Where
-numbers of arcs are free, larger ones are tried until the motion is proved.
+A family makes its motions for cables that leave from points and touch nothing. Among obstacles, or with the shape of a
+platform, only contacts must then be proved, since the family has proved the rest; over pulleys, all criteria must be.
+Where numbers of arcs are free, larger ones are tried until the motion is proved.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_o
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
 
-# Gives answers and motions of some segments, by their indices, with numbers of arcs as in `Waypoints.arcs`.
+# A function of indices of segments and of numbers of arcs, as in `Waypoints.arcs`, that gives answers and motions.
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
 
 
@@ -30,9 +30,9 @@ class VerifiedSegments(NamedTuple):
     """Answers of n segments.
 
     Fields:
-        answers: the family's, with the verdicts of further proofs, and the uncertainty that these tolerate.
-        proofs: of the motions; None: the family refuses the motion, or has none.
-        arcs: (n,) numbers with which the family joins the segments by these motions.
+        answers: answers of the family, with verdicts and tolerated uncertainty of further proofs.
+        proofs: proofs of the motions; None: the family refuses the motion, or has none.
+        arcs: (n,) numbers of arcs with which the family gives these motions.
     """
 
     answers: Answers
@@ -41,19 +41,19 @@ class VerifiedSegments(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    # Answers of the family, further proofs of its motions, and the verdicts (n,) of both.
+    # Answers of the family, further proofs of its motions, and the combined verdicts (n,).
     answers: Answers
     proofs: list[MotionProof | None]
     verdict: np.ndarray
 
 
 class Verifier(NamedTuple):
-    """Verifier of motions, beyond their family.
+    """Verifier of motions that their family has not proved with contacts and pulleys.
 
     Fields:
-        problem: its robot with pulleys, if it has some.
+        problem: the problem, whose robot may have pulleys.
         scene: bodies that can meet, in the robot's axes.
-        intervals: whether intervals of failure are sought, as for `time_proofs`.
+        intervals: whether to find intervals of failure, as in `time_proofs`.
     """
 
     problem: Problem
@@ -71,7 +71,7 @@ class Verifier(NamedTuple):
         answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
         verdict, is_free = trial.verdict.copy(), (arcs == 0) & (step * max_arcs > 0)
         doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNDECIDED != 0)
-        # Over pulleys the number that the family chooses means nothing.
+        # Over pulleys the number that the family chooses is not valid.
         rows = np.flatnonzero(is_free & (self.has_pulleys | (answers.feasible & (verdict != 0))))
         minimum = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
 
@@ -101,13 +101,13 @@ class Verifier(NamedTuple):
         return VerifiedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
 
     def columns(self, join: Join, count: int, *, max_arcs: int) -> dict[str, np.ndarray]:
-        """Columns of a map whose motions keep clear of obstacles, with the answers that the plan of each cell gives."""
+        """Columns of a map of motions among obstacles, equal to the answers of plans of single cells."""
         answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=1, max_arcs=max_arcs)
         clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
         return answers.arrays() | {"clearance": clearance}
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
-        # Verify the motions of a family: without pulleys those that it proves.
+        # Verify motions of a family; without pulleys only those that the family has proved.
         is_verified = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)
         rows, verdict = np.flatnonzero(is_verified), np.array(answers.verdict, FLAGS)
         proofs: list[MotionProof | None] = [None] * len(verdict)
@@ -115,7 +115,7 @@ class Verifier(NamedTuple):
             proofs[i], verdict[i] = proof, proof.verdict
         verdict[~is_verified & (verdict & ~FEWER == 0)] = Verdict.NOT_FINITE
         uncertainty: Any = self.problem.limits.uncertainty
-        if uncertainty is not None and float(uncertainty.spool_positions) > 0.0:  # masses move no cable
+        if uncertainty is not None and float(uncertainty.spool_positions) > 0.0:  # an uncertain mass moves no cable
             answers = self._for_all_robots(answers, motions, verdict, rows[verdict[rows] == 0])
         return _Trial(answers, proofs, verdict)
 
@@ -128,7 +128,7 @@ class Verifier(NamedTuple):
         return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
-        # Verify feasible motions for all robots within an uncertainty; the family has done so except for contacts.
+        # Verify contacts of feasible motions for all robots within an uncertainty; the family has verified the rest.
         proved, refuted = answers.tolerated.copy(), answers.not_tolerated.copy()
         for i in rows.tolist():
             ours = motion_tolerances(self.problem, motions[i], self.scene, contacts_alone=True)

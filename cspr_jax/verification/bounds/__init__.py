@@ -6,7 +6,7 @@ Files, each importing only from those above it:
     batch              several motions of one family, bounded together
     swing_bounds       bounds of swings about P0 over a block of time
     block_slacks       slacks of any motion over blocks of time, from bounds of its states
-    block_parts        blocks of several motions, cut where lines leave little undecided
+    block_parts        blocks of several motions, cut around their undecided parts
     blocks             parts of arcs, halved while they are undecided
     enclosures         bounds of a robot's state over a block of time
 """

@@ -18,8 +18,8 @@ class TimeBounds(NamedTuple):
     """Bounds over k blocks of time; leaves (k,).
 
     Fields:
-        tau: of the normalised time.
-        values: of the amplitude function and its derivatives by tau.
+        tau: bounds of the normalised time.
+        values: bounds of the amplitude function and its derivatives with respect to tau.
     """
 
     tau: AffineBounds
@@ -39,7 +39,7 @@ def time_bounds(
     tau = normalised(duration, start, end)
     knots = np.concatenate([[0.0], np.asarray(amplitude.knots, float), [1.0]])
     pieces, errors = _pieces(amplitude, knots, orders)
-    # Bounds hold for a block that is longer by the uncertainty of the normalised time.
+    # Extend blocks by the rounding error of the normalised time.
     first, last = tau.middle - tau.linear, tau.middle + tau.linear
     bounds = piecewise_bounds(pieces, overlaps(knots, first, last), orders)
     slack = [error + np.asarray(amplitude.largest)[order + 1] * ROUNDING for order, error in enumerate(errors)]
@@ -51,7 +51,7 @@ def time_bounds(
 
 
 def _pieces(amplitude: Amplitude, knots: np.ndarray, orders: int) -> tuple[np.ndarray, list[float]]:
-    # Return Bernstein coefficients (n_pieces, degree + 1, 1), and bounds of their rounding errors for each derivative.
+    # Bernstein coefficients (n_pieces, degree + 1, 1), and bounds of their rounding errors, for each derivative.
     powers, origins = np.asarray(amplitude.coefficients, float), np.asarray(amplitude.origins, float)
     degree = int(np.flatnonzero(powers.any(0)).max(initial=0))
     powers, radii = powers[:, : degree + 1], np.abs(np.stack([knots[:-1], knots[1:]]) - origins).max(0)

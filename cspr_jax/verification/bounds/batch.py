@@ -1,4 +1,4 @@
-"""Motions of one family on one amplitude function, so that bounds of blocks of all are computed together."""
+"""Motions of one family with one amplitude function, so that their blocks are bounded together."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class MotionBatch:
     def __init__(
         self, motions: Any, durations: Float[np.ndarray, "n"], kernel: Callable[[Any], StateBounds], *, orders: int = 3
     ) -> None:
-        """Keep what all have in common."""
+        """Keep data that all motions share."""
         self._motions, self.durations, self._kernel, self._orders = motions, np.asarray(durations), kernel, orders
 
     def __getitem__(self, i: int) -> Any:

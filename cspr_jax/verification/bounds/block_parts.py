@@ -1,8 +1,8 @@
-"""Blocks of some motions with bounds of their slacks, and the parts into which they are cut.
+"""Blocks of several motions with bounds of their slacks, and the parts into which blocks are cut.
 
 Over a block a slack lies between two lines. The part in which the lower line is above a level, or the upper one below
-it, is decided. Where the rest is a small fraction of the block, the block is cut there; at a simple root the rest
-shrinks with the square of its length, while halving would take a step for each binary digit.
+it, is decided. If the undecided part is a small fraction of the block, the block is cut around it; near a simple root
+its length decreases quadratically, while halving would take a step for each binary digit.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from cspr_jax.numerics.shapes import Bool, Complex, Float
 from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 
-SMALL = 0.5  # of a block: a rest below this fraction is cut out, else the block is halved
-WIDER = 1e-3  # of a block, by which a rest is widened at either end
+SMALL = 0.5  # an undecided part below this fraction of its block is cut out, else the block is halved
+WIDER = 1e-3  # fraction of the block by which the undecided part is widened at either end
 
 
 class TimeBlocks(NamedTuple):
@@ -26,7 +26,7 @@ class TimeBlocks(NamedTuple):
         motion: (k,) index of the motion.
         start: (k,) s.
         end: (k,) s.
-        slacks: bounds, (k, n_criteria).
+        slacks: bounds of slacks, (k, n_criteria).
     """
 
     motion: np.ndarray
@@ -46,7 +46,7 @@ class TimeBlocks(NamedTuple):
     def rest(
         self, level: np.ndarray, matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Undecided part of each block: elsewhere each lower line is above a level, or the upper one below it."""
+        """Undecided part of each block, outside of which all slacks are proved above or below their levels."""
         low, high, low_rise, high_rise = self.slacks
         sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
         if has_upper:
@@ -59,13 +59,13 @@ class TimeBlocks(NamedTuple):
     def cut(
         self, first: Float[np.ndarray, "k"], last: Float[np.ndarray, "k"], jumps: Complex[np.ndarray, "n"]
     ) -> "tuple[TimeBlocks, TimeBlocks]":
-        """Cut each block before and after its undecided part, or in two: at a jump of the acceleration, if any."""
+        """Cut each block around its undecided part, or into two, at a jump of the acceleration if there is one."""
         width = self.end - self.start
         before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
         is_cut = (last - first < SMALL) & (before < after)
         outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
         outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
-        # Bounds of a block with a jump inside would be wide on both sides of it.
+        # Do not cut around parts of blocks with a jump inside, whose bounds are wide everywhere.
         start, end = np.where(is_cut, before, self.start), np.where(is_cut, after, self.end)
         middle, has_jump = _jump_within(jumps, self.motion, start, end)
         middle = np.where(has_jump, middle, 0.5 * (start + end))
@@ -75,7 +75,7 @@ class TimeBlocks(NamedTuple):
         return joined(outside), joined([inner.take(~is_split), *halves])
 
     def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
-        # Bounds by the lines between two fractions of the block, which are extended by more than their rounding errors.
+        # Bounds from the lines between two fractions of the block, which are extended beyond their rounding errors.
         low, high, low_rise, high_rise = self.slacks
         ends = [np.broadcast_to(fraction, len(low))[:, None] for fraction in (first, last)]
         lower = np.minimum(*(low_rise * fraction for fraction in ends)) + np.maximum(-low_rise, 0.0)
@@ -86,7 +86,7 @@ class TimeBlocks(NamedTuple):
         return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).take(chosen)
 
     def no_looser_than(self, other: BlockSlacks) -> "TimeBlocks":
-        """The blocks with the better of two bounds."""
+        """The blocks with the tighter of two bounds."""
         low, high, low_rise, high_rise = self.slacks
         is_low, is_high = low < other.low, high > other.high
         return self._replace(
@@ -100,7 +100,7 @@ class TimeBlocks(NamedTuple):
 
 
 def joined(batches: "list[TimeBlocks]") -> TimeBlocks:
-    """All blocks of some lists."""
+    """All blocks of several batches."""
     bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in batches), strict=True))
     motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in batches), strict=True))
     return TimeBlocks(motion, start, end, BlockSlacks(*bounds))
@@ -109,10 +109,10 @@ def joined(batches: "list[TimeBlocks]") -> TimeBlocks:
 def _jump_within(
     jumps: np.ndarray, motion: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Times of jumps strictly within blocks, near their middles, (k,), and whether there are any.
+    # Time of a jump strictly within each block, near its middle, (k,), and whether there is one.
     if not len(jumps):
         return start, np.zeros(len(start), bool)
-    # NumPy orders complex numbers by their real parts first.
+    # NumPy sorts complex numbers by their real parts, the motions, first.
     earliest, latest = (
         np.searchsorted(jumps, motion + 1j * start, side="right"),
         np.searchsorted(jumps, motion + 1j * end),
@@ -122,7 +122,7 @@ def _jump_within(
 
 
 def _below(value: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Fractions between which a line with this value at the start is not above zero.
+    # Fractions of the block between which a line, with this value at the start, is not above zero.
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.clip(-value / rise, 0.0, 1.0)
     return np.where(rise < 0.0, root, 0.0), np.where(rise > 0.0, root, 1.0)

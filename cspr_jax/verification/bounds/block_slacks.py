@@ -1,7 +1,7 @@
-"""Slacks of any motion over blocks of time: bounds, from bounds of its states, of how far each criterion is met.
+"""Bounds of slacks of any motion over blocks of time, from bounds of its states.
 
-A motion passes a singularity, and cables without thickness pass through each other, at isolated times only. Where that
-is proved to happen within a block that is short enough, the slack counts as negative there.
+A motion passes a singularity, and cables without thickness pass through each other, at isolated times only. If such an
+event is proved to happen within a block that is short enough, the slack counts as negative there.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import AT_TIMES, contact_criteria, criteria, pose_conditions
 
-# Blocks that are bounded together, with contacts and without.
+# Numbers of blocks that are bounded together, with contacts and without.
 BATCH = 64
 RATES_BATCH = 128
-# An event at a single time counts if the block and the one before it are together no longer than this, s.
+# Largest duration, s, of a block and the one before it for events at single times to count.
 SHORTEST = 1e-6
-# Upper bound of a slack, with its sign turned, where it is proved to vanish at a single time.
+# Minus the upper bound of a slack that is proved to vanish at a single time.
 SMALLEST = 1e-12
 Pair = tuple[Array, Array] | Array
 # Bounds of slacks, without lines or with them, in the order of the fields of `BlockSlacks`.
@@ -48,14 +48,14 @@ Part = tuple[Array, ...]
 
 
 class BlockSlacks(NamedTuple):
-    """Bounds of slacks over k blocks: by numbers, and by lines over the block that rise from or to these numbers.
+    """Bounds of slacks over k blocks: by numbers, and by lines over the block.
 
     Fields:
         low: (k, n_criteria) lower bounds, -inf without bounds.
         high: (k, n_criteria) upper bounds, inf without bounds.
-        low_rise: (k, n_criteria) rise of the line below the slack, from start to end, whose lower end is at `low`;
-            None: no line is known.
-        high_rise: (k, n_criteria) likewise of the line above, whose higher end is at `high`.
+        low_rise: (k, n_criteria) rise, from start to end, of a line below the slack whose lower end is at `low`; None:
+            there is no line.
+        high_rise: (k, n_criteria) likewise for a line above the slack whose higher end is at `high`.
     """
 
     low: np.ndarray
@@ -64,18 +64,18 @@ class BlockSlacks(NamedTuple):
     high_rise: np.ndarray = None  # type: ignore[assignment]
 
     def complete(self) -> "BlockSlacks":
-        """The bounds with lines, level ones where there are none."""
+        """The bounds with lines, which are level where there were none."""
         rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
         return BlockSlacks(self.low, self.high, *rises)
 
 
 def _lines(below: Pair, above: Pair) -> Part:
-    # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.
+    # Fields of `BlockSlacks` from the values at start and end of a line below and a line above the slack.
     return jnp.minimum(*below), jnp.maximum(*above), below[1] - below[0], above[1] - above[0]
 
 
 def _part(slack: AffineBounds) -> Part:
-    # Bound the smallest value of a parabola.
+    # Bound a slack around a line by lines, and the smallest value of a slack around a parabola by numbers.
     return _lines(*_edges(slack)) if slack.square is None else (slack.low(), slack.low() + 2.0 * slack.radius)
 
 
@@ -94,7 +94,7 @@ def _kernel(
     passes: bool = False,
     contacts_alone: bool = False,
 ) -> tuple[Array, ...] | Array:
-    # Bound the slacks, or tell which of them are proved to vanish at one time.
+    # Bound the slacks, or tell which of them are proved to vanish at a single time.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
         cables, matrix, wrench = _balance(robot, state)
         if passes:
@@ -120,7 +120,7 @@ def _balance(robot: AnyRobot, state: StateBounds) -> tuple[CableBounds, AffineBo
 
 
 def _joined(parts: list[Part]) -> Part:
-    # A part of two bounds has no lines.
+    # Parts with only two bounds have no lines: add level ones.
     level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
     low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
     low, high = jnp.where(jnp.isnan(low), -jnp.inf, low), jnp.where(jnp.isnan(high), jnp.inf, high)
@@ -134,7 +134,7 @@ def _speeds_kernel(velocity: AffineBounds) -> Part:
 
 @persistent_jit
 def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
-    # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
+    # Bound the smallest slacks: the lower end of a line above a slack is an upper bound of its smallest value.
     def one(state: StateBounds) -> tuple[Array, Array]:
         cables, matrix, wrench = _balance(robot, state)
         parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
@@ -175,7 +175,7 @@ def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateB
 
 
 def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
-    """Bounds of the slacks of all other limits over one block; of speeds and accelerations that of the worse sign."""
+    """Bounds of the slacks of all other limits over one block; speeds and accelerations count with the worse sign."""
     parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}
@@ -192,7 +192,7 @@ def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> lis
 
 
 def _within(limit: Array, value: AffineBounds) -> Part:
-    # The smaller of two slacks is above the line between the smaller values at both ends, and below each of both.
+    # The smaller of two slacks is above the line between its values at both ends, and below each of the two.
     one, other = limit - value, value + limit
     if value.square is not None:
         return tuple(jnp.minimum(*sides) for sides in zip(_part(one), _part(other), strict=True))
@@ -220,12 +220,12 @@ def block_slacks(
     rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
     at_times = np.array([row.flag in AT_TIMES for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_times]
-    # An event at the border of two blocks is within the second one and the end of the first.
+    # Extend blocks to the front, so that an event at the border of two blocks lies within an extended block.
     before = np.maximum(2.0 * start - end, 0.0)
     short = np.flatnonzero(is_open.any(1) & (end - before <= SHORTEST))
     if len(short):
         kernel = partial(_kernel, robot, limits, bodies, passes=True)
-        # Bounds are of all blocks together, which may be those of several motions.
+        # `bounds` takes all blocks, which may belong to several motions.
         states = jax.tree.map(lambda array: np.asarray(array)[short], bounds(before, end))
         passes = in_batches(kernel, states, batch_size=BATCH)
         passes = passes if rows[np.argmax(at_times)].flag == Verdict.SINGULAR else passes[:, 1:]
@@ -239,10 +239,10 @@ def block_slacks(
 def rate_slacks(
     robot: AnyRobot, limits: Limits, states: StateBounds
 ) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
-    """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone."""
+    """Bounds of the smallest slacks of tensions and limits, the first criteria, over blocks."""
     return in_batches(partial(_rates_kernel, robot, limits), states, batch_size=RATES_BATCH)
 
 
 def speed_slacks(states: StateBounds) -> BlockSlacks:
-    """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed."""
+    """Bounds of minus the speed of the mass centre over k blocks; adding the limit makes it a slack."""
     return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, batch_size=RATES_BATCH))

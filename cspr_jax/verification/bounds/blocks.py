@@ -11,18 +11,18 @@ import numpy as np
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.shapes import Float, Num
 
-# A remainder of a piece between knots that is shorter than this fraction of a block adds no further block.
+# The rest of a piece between knots adds a block only if it is longer than this fraction of a block.
 SLIVER = 0.3
-SAMPLES = 1025  # at which the number of parts of an arc is tabulated
+SAMPLES = 1025  # number of tau at which the number of parts of an arc is tabulated
 
 
 class Blocks(NamedTuple):
     """Blocks of motions.
 
     Fields:
-        row: (k,) index of the motion that the block belongs to.
-        start: (k,) tau where it starts.
-        stop: (k,) tau where it stops; no knot inside.
+        row: (k,) index of the motion to which the block belongs.
+        start: (k,) tau at its start.
+        stop: (k,) tau at its end; there is no knot inside.
     """
 
     row: np.ndarray
@@ -34,7 +34,7 @@ class Blocks(NamedTuple):
         return Blocks(*(x[rows] for x in self))
 
     def times(self, positions: np.ndarray) -> Float[np.ndarray, "m k"]:
-        """Times at the same positions, -1 to 1, of each block."""
+        """Times at given positions, from -1 to 1, in each block."""
         return 0.5 * (self.start + self.stop) + positions * (0.5 * (self.stop - self.start))
 
     def halves(self) -> "Blocks":
@@ -48,25 +48,25 @@ class Blocks(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """Number of parts that an arc is cut into, at equidistant tau from 0 to 1.
+    """Number of parts into which an arc is cut, at equidistant tau from 0 to 1.
 
     Fields:
-        at_cusps: (m,) the number if there is a cusp there.
-        at_middles: (m,) the number if tau is halfway between two cusps. In between it follows the squared sine
-            of the phase.
+        at_cusps: (m,) the number where tau is at a cusp.
+        at_middles: (m,) the number where tau is halfway between two cusps; in between it follows the squared sine of
+            the phase.
     """
 
     at_cusps: np.ndarray
     at_middles: np.ndarray
 
     def of(self, arcs: int) -> Float[np.ndarray, "m"]:
-        """Number of parts of an arc, along a motion of so many arcs."""
+        """Number of parts of an arc, along a motion with a number of arcs."""
         fraction = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
         return self.at_cusps + (self.at_middles - self.at_cusps) * fraction
 
 
 def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
-    """Number of parts of an arc along a motion from rest: more where it swings farther."""
+    """Number of parts of an arc along a motion from rest, which increases with the amplitude."""
     tau = np.linspace(0.0, 1.0, SAMPLES)
     piece = np.searchsorted(np.asarray(amplitude.knots), tau)
     coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
@@ -79,7 +79,7 @@ def parts_of_arcs(arcs: Num[np.ndarray, "n"], knots: Float[np.ndarray, "n_knots"
     numbers, group = np.unique(arcs, return_inverse=True)
     edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
     lengths = np.array([len(x) for x in edges], int)
-    # All edges are in one array. Find where those of each motion begin in it, and the edge at which each block starts.
+    # All edges are in one array: find where the edges of each motion begin, and the edge at which each block starts.
     begins, counts = (np.cumsum(lengths) - lengths)[group], (lengths - 1)[group]
     row = np.repeat(np.arange(len(arcs)), counts)
     first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)
@@ -88,15 +88,15 @@ def parts_of_arcs(arcs: Num[np.ndarray, "n"], knots: Float[np.ndarray, "n_knots"
 
 
 def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:
-    # Return the edges of the blocks of a motion; its two ends are among the knots.
+    # Edges of the blocks of a motion; its two ends are among the knots.
     each = parts.of(arcs) if isinstance(parts, Parts) else np.full(2, float(parts))
     tau = np.linspace(0.0, 1.0, len(each))
-    # Count the parts that lie before each tau.
+    # Number of parts before each tau.
     before = arcs * np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
     inside = []
     for start, stop in itertools.pairwise(knots):
         first, last = np.interp([start, stop], tau, before)
-        # Blocks are equal within each piece, so that no sliver is left beside a knot.
+        # Divide each piece into equal blocks, so that no short one is left beside a knot.
         count = max(1, math.ceil(last - first - SLIVER))
         if isinstance(parts, Parts):
             edges = np.interp(np.linspace(first, last, count + 1), before, tau)

@@ -1,7 +1,7 @@
-"""Enclosures of a robot in motion: bounds of its state over a block of time, for all robots that differ a little.
+"""Enclosures of a robot in motion: bounds of its state over blocks of time, for proofs about slightly different robots.
 
-NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in the axes
-of the platform, in which the attachment points do not move; for a point mass, these are the fixed axes.
+NumPy throughout, since blocks are few and LAPACK inverts the structure matrix. All vectors are in the axes of the
+platform, in which the attachment points do not move; for a point mass, these are the fixed axes.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ class Distances(NamedTuple):
 
     Fields:
         bound: (k, m) lower bounds in the middle of each block, along some unit vectors.
-        change: (k, m) by how much the distances can shrink within the block.
-        tilt: (k, m) gain of the bounds, per displacement of the spools, along vectors tilted against it.
+        change: (k, m) largest decrease of the distances within the block.
+        tilt: (k, m) gain of the bounds, per displacement of the spools, from tilting the unit vectors against it.
         sine: (k, m) sine of the angle of that tilt per displacement, 1/m; the bounds shrink by its cosine.
-        swing: (k, m) what the tilted bounds can lose within the block beside `change`, per displacement.
+        swing: (k, m) further decrease of the tilted bounds within the block, per displacement.
         spools: (m,) largest loss of each distance, per largest displacement of a spool.
         middle: (k, l) distances in the middle.
         middle_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
@@ -37,14 +37,14 @@ class Distances(NamedTuple):
     middle_spools: np.ndarray
 
     def hold(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
-        """Tell whether all distances stay positive within blocks, however spools move: proved."""
+        """Prove that all distances stay positive within blocks, for all displacements of the spools."""
         far = spools[:, None]
         cosine = np.sqrt(np.maximum(1.0 - (far * self.sine) ** 2, 0.0))
         low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
         return ((low > self.spools * far) & (far * self.sine < 1.0)).all(1)
 
     def fail(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
-        """Tell whether the worst displacements of the spools use up a distance in the middle of each block."""
+        """Tell whether the worst displacements of the spools reduce a distance to zero in the middle of each block."""
         return (self.middle < self.middle_spools * spools[:, None]).any(1)
 
 
@@ -55,7 +55,7 @@ class Rates(NamedTuple):
         velocity: (k, n_cables, 3) in the middle, m/s.
         acceleration: (k, n_cables, 3) m/s^2.
         velocity_change: (k, n_cables) largest change of the velocity from the middle, within the block, m/s.
-        acceleration_change: (k, n_cables) largest such change of the acceleration, m/s^2.
+        acceleration_change: (k, n_cables) largest change of the acceleration likewise, m/s^2.
     """
 
     velocity: np.ndarray
@@ -68,16 +68,16 @@ class Enclosure(NamedTuple):
     """Middle states and bounds of k blocks of motions; "in the middle" means at the middle time.
 
     Fields:
-        rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
-        arms: (n_cables, 3) attachment points from the mass centre, m; zero of a point mass.
+        rays: (k, n_cables, 3) vectors from spool to attachment point in the middle, m.
+        arms: (n_cables, 3) attachment points from the mass centre, m; zero for a point mass.
         force: (k, 3) force that the cables supply, per mass, in the middle, m/s^2.
         moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
-        acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative
+        acceleration_matrix: (k, 3, 3) matrix from a point of the platform, relative to the mass centre, to its relative
             acceleration, 1/s^2.
         tangent: (k, n_cables, 3) change of the tangents of the rays from the middle to the end of the block, m.
         deviation: (k, n_cables) largest distance of the rays from their tangents within the block, m.
         force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
-        acceleration_matrix_change: (k,) largest such change of `acceleration_matrix`, 1/s^2.
+        acceleration_matrix_change: (k,) largest change of `acceleration_matrix` likewise, 1/s^2.
         low: (k, n_cables) lower bounds of the tensions per mass and length within the block, 1/s^2.
         high: (k, n_cables) upper bounds of the tensions per mass and length, 1/s^2.
         distances: distances that shrink as spools move.
@@ -115,7 +115,7 @@ class Enclosure(NamedTuple):
         return self._replace(**fields, distances=distances, rates=rates)
 
     def middle(self, mu: Float[np.ndarray, "k n_cables"]) -> "Enclosure":
-        """Enclosure of the middle times alone, as if blocks had no length."""
+        """Enclosure of the middle times alone, with blocks of length zero."""
         names = "tangent", "deviation", "force_change", "acceleration_matrix_change"
         changes = {name: np.zeros_like(getattr(self, name)) for name in names}
         static = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
@@ -147,11 +147,11 @@ class Influence(NamedTuple):
 
     Fields:
         spools: (k, n_cables, n_cables, 3) g_kj, 1/m.
-        across: likewise, the part of g_kj across ray j: a displacement along the ray changes no tension.
+        across: likewise the part of g_kj across ray j, since displacements along the ray change no tension.
         centre: (k, n_cables, 3) h_k, 1/(m s^2).
         forces: (k, n_cables, 3) mu_k for unit forces per mass, 1/m.
         moments: (k, n_cables, 3) mu_k for unit moments per mass, 1/m^2.
-        lengths: (k, n_cables) of the cables, m.
+        lengths: (k, n_cables) lengths of the cables, m.
         mu: (k, n_cables) tensions per mass and length, 1/s^2.
     """
 
@@ -188,7 +188,7 @@ def influence(enclosure: Enclosure) -> Influence:
 
 
 def inverted(matrices: Float[np.ndarray, "k m n"]) -> Float[np.ndarray, "k n m"]:
-    """Inverse matrices; pseudo-inverses for two cables in the plane y = 0, which supply no force across it."""
+    """Inverse matrices; pseudo-inverses for two cables in the plane y = 0, which supply no force normal to it."""
     if matrices.shape[1] == matrices.shape[2]:
         is_regular = np.isfinite(matrices).all((1, 2)) & (np.linalg.det(matrices) != 0.0)
         safe = np.where(is_regular[:, None, None], matrices, np.eye(matrices.shape[1]))

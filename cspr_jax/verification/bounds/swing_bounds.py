@@ -42,7 +42,7 @@ def swing_bounds(
             (r2 - r * steady) * cosine - r1 * sine * (2.0 * steady / omega),
             (r2 + r * steady) * sine * nu,
         )
-    # Into the axes of the robot.
+    # Rotate into the axes of the robot.
     position, velocity, acceleration = (
         rotated(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
         for x, y in (local_position, local_velocity, second_derivative)

@@ -17,7 +17,7 @@ def rates_hold(
     is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return is_met
-    # Within the block every ray of every robot lies in a ball around the planned ray in the middle.
+    # Within the block each ray of every robot lies in a ball around the planned ray in the middle.
     ball = np.minimum((enclosure.moved + spools[:, None]) / influence.lengths, 1.0)
     units, rates = enclosure.rays / influence.lengths[..., None], enclosure.rates
     slowest, fastest = _along(units, rates.velocity, ball)
@@ -44,7 +44,7 @@ def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Bound the component of vectors along all rays within balls around the given ones, of `ball` times their length.
+    # Bound components of vectors along all rays within balls around given rays, of radii `ball` times their lengths.
     component, norm = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
     across = np.sqrt(np.maximum(norm**2 - component**2, 0.0))
     angle, inclination = np.arcsin(ball), np.arctan2(across, component)
@@ -54,7 +54,7 @@ def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np
 def rates_fail(
     enclosure: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
 ) -> Bool[np.ndarray, "k"]:
-    """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
+    """Tell whether a cable of some robot exceeds a limit of speed or acceleration in the middle of each block.
 
     Spools are displaced along their rays, and across them in the direction of the velocity or the acceleration.
     """

@@ -27,7 +27,7 @@ from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated_by
 from cspr_jax.verification.robustness.uncertain_slacks import blocks_hold, radii_of, states_fail, worst_directions
 from cspr_jax.verification.time_proof import FIRST
 
-STATES = 256  # in one batch
+STATES = 256  # number of states of a batch
 
 
 @dataclasses.dataclass
@@ -93,14 +93,14 @@ def _constant_states(motion: Motion, tau) -> StateBounds:
 
 
 def states_as_bounds(motion: Motion, tau: Float[np.ndarray, "k"]) -> StateBounds:
-    """States of a motion, as bounds of blocks without a length."""
+    """States of a motion, as bounds over blocks of length zero."""
     return in_batches(partial(_constant_states, common_shape(motion)), tau, batch_size=STATES)
 
 
 def motion_tolerances(
     problem: Problem, motion: BoundedMotion, scene: Scene | None = None, *, contacts_alone: bool = False
 ) -> Tolerated:
-    """Multiples of the uncertainty that a motion tolerates."""
+    """Multiples of the uncertainty that a motion is proved to tolerate, and that are refuted."""
     duration = float(motion.duration())
     jumps = motion.jumps() if hasattr(motion, "jumps") else np.zeros(0)
     edges = np.unique(

@@ -1,6 +1,6 @@
-"""Largest multiple of an uncertainty that motions are proved to tolerate, and the smallest that is refuted.
+"""Largest multiple of an uncertainty that motions are proved to tolerate, and smallest multiple that is refuted.
 
-Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks a criterion in the
+Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that fails a criterion in the
 middle of a block bounds the multiple from above (`uncertainty.fails`).
 """
 
@@ -19,20 +19,20 @@ from cspr_jax.verification.bounds.blocks import Blocks
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, influence
 from cspr_jax.verification.robustness.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
 
-# These are tried first, in their order. A multiple that fails is then divided by `RATIO` while it fails, down to
-# `SMALLEST`.
+# Multiples that are tried first, in this order. A multiple that fails is divided by `RATIO` as long as it fails, down
+# to `SMALLEST`.
 FIRST_MULTIPLES = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
 RATIO = 8.0
 SMALLEST = 1e-6
 NEAR = 0.99  # ratio of the proved to the refuted multiple at which the search ends
-STEPS = 12  # bisections for each of the two
-HALVINGS = 14  # of a block, at most
-OPEN = 256  # blocks of an arc, at most
-# Factor of `OPEN` at the multiple 1, which decides whether a motion is feasible.
+STEPS = 12  # number of bisections for each of the two multiples
+HALVINGS = 14  # largest number of halvings of a block
+OPEN = 256  # largest number of open blocks per arc
+# Factor on `OPEN` for the multiple 1, which decides whether a motion is feasible.
 DECIDED = 4.0
 LOWERED = 0.95  # factor by which a target is lowered if more blocks are open
-LOWERINGS = 8  # largest number of times in a row that it is
-# Levels of halving at which a robot that fails is looked for although the bounds cannot hold.
+LOWERINGS = 8  # largest number of times in a row that a target is lowered
+# Number of further halvings in search of a robot that fails, after bounds are found that cannot hold.
 MORE = 3
 
 
@@ -40,8 +40,8 @@ class Tolerated(NamedTuple):
     """Multiples of an uncertainty, of n motions.
 
     Fields:
-        proved: (n,) every robot within this multiple is proved to meet all criteria; 0 where nothing is proved.
-        refuted: (n,) a robot within this multiple breaks a criterion; infinite where none was found.
+        proved: (n,) multiple within which every robot is proved to meet all criteria; 0 where nothing is proved.
+        refuted: (n,) multiple within which some robot fails a criterion; infinite where none was found.
     """
 
     proved: np.ndarray
@@ -49,7 +49,7 @@ class Tolerated(NamedTuple):
 
 
 class Pool(Protocol):
-    """Open blocks, and their bounds; multiples are (k,), one for each block."""
+    """Open blocks with their bounds; multiples are (k,), one for each block."""
 
     blocks: Blocks
 
@@ -62,7 +62,7 @@ class Pool(Protocol):
         ...
 
     def middles(self) -> "Pool":
-        """Middles of the blocks, as if blocks had no length."""
+        """Middles of the blocks, as blocks of length zero."""
         ...
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
@@ -77,7 +77,7 @@ class Pool(Protocol):
         ...
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
-        """Tell in the middle of which blocks a robot within a multiple breaks a criterion.
+        """Tell in the middle of which blocks a robot within a multiple fails a criterion.
 
         Args:
             multiple: (k,).
@@ -132,7 +132,7 @@ def tolerated(
 
 
 def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, full: bool = True) -> Tolerated:
-    """Multiples of an uncertainty, as `tolerated` gives them, by any pool of blocks."""
+    """Multiples of an uncertainty, like `tolerated`, for any pool of blocks."""
     search = _MultipleSearch(arcs, full=full)
     search.refuted = (
         _refuted_first(pool, len(arcs)) if full else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
@@ -149,7 +149,7 @@ def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, full: bool = True) -
 
 
 class _MultipleSearch:
-    # State of the search for n motions: refuted multiples, targets and, of motions that are done, proved multiples.
+    # State of the search for n motions: refuted multiples, targets and, for finished motions, proved multiples.
 
     def __init__(self, arcs: np.ndarray, *, full: bool) -> None:
         self._arcs, self._full, self._count = arcs, full, len(arcs)
@@ -158,18 +158,18 @@ class _MultipleSearch:
 
     @property
     def _most_open(self) -> np.ndarray:
-        # Multiples other than 1 need not be as close: no verdict depends on them.
+        # Multiples other than 1 may be less close, since no verdict depends on them.
         return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
 
     def left(self, pool: Pool) -> Pool:
-        # Return the blocks of open motions.
+        # Blocks of open motions.
         if self._full:
             self.targets = _reachable(pool, self.targets)
         self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
         return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
     def open_blocks(self, pool: Pool, level: int) -> np.ndarray:
-        # Return the blocks to be halved; finish motions without any, and motions with too many.
+        # Blocks to be halved; finish motions that have none, or too many.
         row = pool.blocks.row
         is_open = ~pool.hold(self.targets[row])
         is_open = self._lessened(pool, is_open) if self._full else self._hopeful(pool, is_open)
@@ -196,7 +196,7 @@ class _MultipleSearch:
         return is_open
 
     def _hopeful(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
-        # Once the middle of a block cannot hold, nothing can be proved for its motion: only look for a robot that
+        # Once the middle of a block cannot hold, nothing can be proved for its motion: only search for a robot that
         # fails, in such middles.
         row = pool.blocks.row
         is_bad = is_open & ~pool.middles().hold(self.targets[row])
@@ -204,13 +204,13 @@ class _MultipleSearch:
         return is_open & (is_bad | ~self._is_hopeless[row])
 
     def refute(self, pool: Pool) -> None:
-        # Take in the multiples that the middles of new blocks refute.
+        # Add multiples that the middles of new blocks refute.
         self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._full else self.targets)
         self.targets = np.minimum(self.targets, _targets(self.refuted, full=self._full))
 
 
 def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
-    # Lower the multiples that cannot hold even in a middle.
+    # Lower multiples that cannot hold even in the middle of a block.
     row, middles = pool.blocks.row, pool.middles()
     fails = ~middles.hold(multiples[row])
     if not fails.any():
@@ -229,19 +229,19 @@ def _enclosed(requirements: Requirements, enclose: Callable[[Blocks], Enclosure]
 
 
 def _targets(refuted: np.ndarray, *, full: bool) -> np.ndarray:
-    # Return the multiples that are to be proved; 0 where the search has ended.
+    # Multiples to be proved next; 0 where the search has ended.
     if not full:
         return np.where(refuted > 1.0, 1.0, 0.0)
     return np.minimum(_near(refuted), LARGEST_MULTIPLE)
 
 
 def _near(multiple: np.ndarray) -> np.ndarray:
-    # Return a slightly smaller multiple, but not less than 1 if it is more.
+    # A slightly smaller multiple, but at least 1 if the multiple is above 1.
     return _not_across_one(NEAR * multiple, multiple)
 
 
 def _not_across_one(smaller: np.ndarray, multiple: np.ndarray) -> np.ndarray:
-    # At 1 it is decided whether a motion is feasible.
+    # Do not pass 1, at which it is decided whether a motion is feasible.
     return np.where(multiple > 1.0, np.maximum(smaller, 1.0), smaller)
 
 
@@ -250,7 +250,7 @@ def _any(row: np.ndarray, is_so: np.ndarray, count: int) -> np.ndarray:
 
 
 def _refuted_first(pool: Pool, count: int) -> np.ndarray:
-    # Find the smallest of the first multiples that the middles refute, then narrow it down.
+    # Find the smallest of the first multiples that middles of blocks refute, then narrow it down.
     high, row = np.full(count, np.inf), pool.blocks.row
     for multiple in FIRST_MULTIPLES:
         left = pool.part(np.isinf(high)[row])
@@ -267,7 +267,7 @@ def _refuted_first(pool: Pool, count: int) -> np.ndarray:
 
 
 def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
-    # Try the multiples on the blocks, narrow down those that they refute, and return the smallest refuted multiples.
+    # Try multiples in the middles of blocks, narrow down those that are refuted, and return the smallest.
     multiples = np.minimum(multiples, LARGEST_MULTIPLE)
     is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
     high = np.where(is_new, multiples, np.inf)
@@ -275,7 +275,7 @@ def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np
 
 
 def _narrowed(pool: Pool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle still refutes it.
+    # Lower `high`, if it is finite and hence refuted by some middle, towards `low`, while some middle still refutes it.
     pool = pool.part(np.isfinite(high)[pool.blocks.row])
     pool = pool.part(pool.fail(high[pool.blocks.row]))
     low, high = low.copy(), high.copy()
@@ -291,7 +291,7 @@ def _narrowed(pool: Pool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _held(left: Pool, multiples: np.ndarray) -> np.ndarray:
-    # Find the largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep theirs.
+    # Largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep their multiples.
     row = left.blocks.row
     low, high = np.zeros(len(row)), multiples[row]
     for _ in range(STEPS):

@@ -1,11 +1,11 @@
-"""Slacks of all robots within an uncertainty, over blocks of time: proved positive, or broken by one of these robots.
+"""Slacks of all robots within an uncertainty, over blocks of time: proved positive, or refuted by one of these robots.
 
-Spools and the mass centre lie in balls around their positions. What is proved rests on the tensions of
-`robots.bounds.uncertain_tensions`, for the smallest and the largest mass: sums of the tensions of both, in proportion,
-serve all masses between. Lengths change by no more than spools do; unit vectors of cables stay in cones, which bounds
+Spools and the mass centre lie in balls around their positions. Proofs rest on the tensions of
+`robots.bounds.uncertain_tensions`, for the smallest and the largest mass: weighted means of both tensions serve all
+masses between. Lengths change by no more than the spools move; unit vectors of cables stay in cones, which bounds
 rates, accelerations and clearances. Determinant and depth are checked for the planned robot alone.
 
-What is refuted rests on the slacks of single robots in single states, displaced along differences of these slacks.
+Refutations rest on slacks of single robots in single states, displaced along gradients of these slacks.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import limit_slacks, tension_slacks
 
-STEP = 1e-6  # displacement by which differences are taken, over the length of a cable
-NEAREST = 2  # criteria of which the worst displacements are sought
-BATCH = 256  # robots in single states
+STEP = 1e-6  # displacement for finite differences, over the length of a cable
+NEAREST = 2  # number of criteria, those with the smallest slacks, for which worst displacements are computed
+BATCH = 256  # number of robots in single states of a batch
 
 
 class Radii(NamedTuple):
-    """A multiple of an uncertainty, one for each block, or of one.
+    """Multiple of an uncertainty, for each of k blocks or for one.
 
     Fields:
         spools: (k,) or () largest displacement of a spool, m.
-        centre: (k,) or () likewise of the mass centre, m.
-        factor: (k,) or () of the mass.
+        centre: (k,) or () largest displacement of the mass centre, m.
+        factor: (k,) or () largest factor of the mass.
     """
 
     spools: Array
@@ -105,8 +105,8 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
 def _cable_slacks(
     robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, radii: Radii
 ) -> list[Array]:
-    # Bound the slacks of tensions, and of the limits of lengths, speeds and accelerations, from below, with the unit
-    # vectors u' of cables at most `turn` from u.
+    # Bound the slacks of tensions, and of limits of lengths, speeds and accelerations, from below; the unit vectors u'
+    # of cables are at a distance of at most `turn` from u.
     low, high = tension_range(robot, limits)
 
     def at_mass(ratio: Array) -> UncertainTensions:
@@ -154,8 +154,8 @@ def _upper_slacks(
     *,
     contacts_alone: bool,
 ) -> Array:
-    # Upper bounds of slacks, (k, n_slacks), in states, of robots whose spools and mass centre are moved, (k, n_cables
-    # + 1, 3) m, and whose masses are multiples of the planned one, (k,).
+    # Upper bounds of slacks, (k, n_slacks), in states, of robots with displaced spools and mass centre, (k, n_cables
+    # + 1, 3) m, and with masses that are multiples of the planned mass, (k,).
     def one(state: StateBounds, moved: Array, ratio: Array) -> Array:
         other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
         cables, unit = cable_bounds(other, state), 1.0 / wrench_units(robot)
@@ -198,11 +198,11 @@ def worst_directions(
     *,
     contacts_alone: bool = False,
 ) -> Float[np.ndarray, "k 2 n_cables+1 3"]:
-    """Unit displacements that are worst, to first order, for the criteria that an uncertainty breaks first."""
+    """Unit displacements that are worst, to first order, for the criteria that fail first."""
     count = robot.n_cables + 1
     rays = np.asarray(robot.base_points)[None] - states.position.middle[:, None]
     step = STEP * np.linalg.norm(rays, axis=2).max(1)[:, None, None, None]
-    # The planned robot comes first.
+    # The first row is the planned robot, the others have one displaced coordinate each.
     moves = np.eye(3 * count + 1, 3 * count, -1).reshape(1, -1, count, 3)
     ratio = np.ones((len(step), 3 * count + 1))
     high = _of_robots(robot, limits, bodies, states, step * moves, ratio, contacts_alone=contacts_alone)
@@ -230,7 +230,7 @@ def states_fail(
     *,
     contacts_alone: bool = False,
 ) -> Bool[np.ndarray, "k"]:
-    """Tell in which states a robot that is displaced, light or heavy, breaks a criterion."""
+    """Tell in which states a robot with the worst displacements, and extreme masses, fails a criterion."""
     distances = np.repeat(np.stack([radii.spools, radii.centre], axis=1), [robot.n_cables, 1], axis=1)
     moved = np.repeat(distances[:, None, :, None] * directions, 2, axis=1)
     ratio = np.tile(np.stack([1.0 / radii.factor, radii.factor], axis=1), (1, directions.shape[1]))

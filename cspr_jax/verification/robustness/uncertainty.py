@@ -1,14 +1,14 @@
 """Verdicts about all robots within an uncertainty, over blocks of time: proved, or refuted by one of these robots.
 
-The motion is the planned one; spools, mass centre and mass differ from the plan's. With W the structure matrix and w
-the wrench per mass in the middle of a block, W mu = w, and E what rays within the block and displaced spools add to W,
-the tensions mu' of another robot differ from the planned ones mu at the same time by d = mu' - mu,
+The motion is the planned one; spools, mass centre and mass differ from the plan. Let W be the structure matrix and w
+the wrench per mass in the middle of a block, W mu = w, and E the change of W by displaced spools and by the motion of
+rays within the block. Tensions mu' of another robot differ from the planned ones mu at the same time by d = mu' - mu,
 
     |d| <= A |d| + B mu + b,    so |d| <= (1 - A)^-1 (B mu + b)  where the spectral radius of A = G + B is below 1,
 
 component by component. G_kj is |g_kj . the tangent of ray j| plus |g_kj| times the distance of the ray from its
-tangent, B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass centre:
-docs/theory.md. Then no such robot is singular either.
+tangent, B_kj is |part of g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass
+centre (docs/theory.md). If this holds, no such robot is singular either.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from cspr_jax.robots.model.limits import Limits, Uncertainty
 from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, inverted, structure
 from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
 
-# Blocks without an enclosure have infinite bounds and no inverse. They become NaN, which neither proves nor refutes.
+# Blocks without an enclosure have infinite bounds and no inverse: they give NaN, which neither proves nor refutes.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # Largest relative error of solving for a deviation, and of the tensions.
 SOLVING_ERROR = 1e-9
-# Rounds in which functionals are corrected, and the relative surplus of each correction.
+# Number of rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS = 8
 SPARE = 0.01
 
@@ -42,8 +42,8 @@ class Requirements:
 
     Fields:
         mass: kg.
-        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, (n,) for each motion.
-        limits: the limits as proofs take them, NumPy.
+        slack: (n,) for each motion, tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2.
+        limits: limits widened for proofs, NumPy.
         uncertainty: the uncertainty.
     """
 
@@ -62,7 +62,7 @@ def requirements_of(problem: Problem, slack: Float[np.ndarray, "n"]) -> Requirem
 
 
 class _Radii(NamedTuple):
-    # A multiple of an uncertainty, one for each block: radii (k,) m, and the factor of the mass.
+    # Multiple of an uncertainty for each block: radii (k,) m, and the factor of the mass.
     spools: np.ndarray
     centre: np.ndarray
     factor: np.ndarray
@@ -79,8 +79,8 @@ def _radii(requirements: Requirements, multiple: np.ndarray) -> _Radii:
 
 class _Effects(NamedTuple):
     # Effects of a multiple of the uncertainty in k blocks, (k, n_cables) each: `off`, displacement of spools across
-    # rays, at planned lengths; `tilt`, motion of rays from the middle, over their lengths; `centre`, effect of the mass
-    # centre on tensions.
+    # rays of planned lengths; `tilt`, motion of rays from the middle, over their lengths; `centre`, effect of the
+    # mass centre on tensions.
     off: np.ndarray
     tilt: np.ndarray
     centre: np.ndarray
@@ -89,7 +89,7 @@ class _Effects(NamedTuple):
 def _effects(enclosure: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Effects:
     near = influence.lengths - enclosure.moved
     fraction = spools[:, None] / np.where(near > 0.0, near, np.nan)
-    # A displacement of a spool is replaced by one across its ray alone that has the same effect at the planned length.
+    # Replace each displacement of a spool by one across the ray alone with the same effect at the planned length.
     off = np.where(fraction < 1.0, spools[:, None] / np.sqrt(1.0 - fraction**2), np.nan)
     direct_effect, moment, force = (
         np.linalg.norm(x, axis=2) for x in (influence.centre, influence.moments, influence.forces)
@@ -109,7 +109,7 @@ def _effects(enclosure: Enclosure, influence: Influence, spools: np.ndarray, cen
 def _changes(
     enclosure: Enclosure, influence: Influence, vectors: np.ndarray, far: _Effects
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Bound the changes of rays within blocks, and by displaced spools, along vectors (k, ..., n_cables, 3).
+    # Bound changes of rays, within blocks and by displaced spools, along vectors (k, ..., n_cables, 3).
     shape = (len(vectors), *(1,) * (vectors.ndim - 3), *enclosure.deviation.shape[1:])
     full = np.linalg.norm(vectors, axis=-1)
     units = (enclosure.rays / influence.lengths[..., None]).reshape(*shape, 3)
@@ -126,7 +126,7 @@ def _changes(
 def deviations(
     enclosure: Enclosure, influence: Influence, spools: Float[np.ndarray, "k"], centre: Float[np.ndarray, "k"]
 ) -> Float[np.ndarray, "k n_cables"]:
-    """Largest differences between tensions of robots and the planned ones, at the same time of a block."""
+    """Largest differences between tensions of robots and planned tensions at the same time of a block."""
     far = _effects(enclosure, influence, spools, centre)
     within, displaced = _changes(enclosure, influence, influence.spools, far)
     rest = (displaced @ enclosure.high[..., None])[..., 0] + SOLVING_ERROR * enclosure.high + far.centre
@@ -137,8 +137,8 @@ class Changes(NamedTuple):
     """Largest changes of tensions, per mass and length.
 
     Fields:
-        down: (k, n_cables) 1/s^2; infinite where nothing is known.
-        up: (k, n_cables) likewise.
+        down: (k, n_cables) largest decrease, 1/s^2; infinite where no bound is known.
+        up: (k, n_cables) largest increase, 1/s^2; likewise.
     """
 
     down: np.ndarray
@@ -158,10 +158,11 @@ def closer_changes(
 ) -> Changes:
     """Closer bounds of the changes of tensions, which hold as long as no tension falls below its smallest value.
 
-    Change the planned robot into another one continuously, until a first tension mu'_k reaches its smallest value.
-    All others are then above theirs, and at least 0. With c_j the terms of row k of B, mu'_k has changed by at most
-    the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at most y . w for every
-    functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
+    Change the planned robot continuously into another one, until a first tension mu'_k reaches its smallest value. All
+    other tensions are then above their smallest values, and at least 0. With c_j the entries of row k of B, mu'_k has
+    changed by at most the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at
+    most y . w for every functional y of wrenches whose products with the columns of the other robot's W are at least
+    c_j.
     """
     far = _effects(enclosure, influence, spools, centre)
     within, displaced = _changes(enclosure, influence, influence.spools, far)
@@ -174,13 +175,13 @@ def closer_changes(
 
 
 def _largest_sum(enclosure: Enclosure, influence: Influence, weights: np.ndarray, far: _Effects) -> np.ndarray:
-    # Bound the sum of tensions of any robot, none below 0, times each of the rows of weights (k, n_cables, n_cables).
+    # Bound sums of tensions, none below 0, of any robot, weighted by the rows of weights (k, n_cables, n_cables).
     more = np.zeros_like(weights)
     for _ in range(ROUNDS):
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
         moved, shifted = _changes(enclosure, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + SOLVING_ERROR * np.max(weights, axis=2, keepdims=True), more
-    # The last correction was computed for the functional of the round before; test that it holds for its own.
+    # The last correction was computed for the functional of the round before: test it for the corrected one.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
     moved, shifted = _changes(enclosure, influence, functional, far)
     total = np.sum((weights + last) * (enclosure.high + far.centre)[:, None] + moved * enclosure.high[:, None], axis=2)
@@ -189,7 +190,7 @@ def _largest_sum(enclosure: Enclosure, influence: Influence, weights: np.ndarray
 
 
 def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    # Find x with x >= matrix x + rest, all of them positive, which proves the spectral radius of the matrix below 1.
+    # Find a positive x with x >= matrix x + rest, which proves that the spectral radius of the matrix is below 1.
     is_finite = np.isfinite(matrix).all((1, 2)) & np.isfinite(rest).all(1)
     count = matrix.shape[1]
     system = np.where(is_finite[:, None, None], np.eye(count) - matrix, np.eye(count))
@@ -233,7 +234,7 @@ def holds(
 def _minimum_tensions(
     enclosure: Enclosure, influence: Influence, requirements: Requirements, radii: _Radii
 ) -> np.ndarray:
-    # Return the smallest tensions per mass and length that are allowed within blocks.
+    # Smallest tensions per mass and length that are allowed within blocks.
     minimum = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
     limit = requirements.limits.tension_min
     if limit is None:
@@ -259,9 +260,9 @@ class WorstDisplacements(NamedTuple):
     """Unit displacements that are worst, to first order, in the middles of k blocks.
 
     Fields:
-        spools: (1 or 2, k, n_cables, 3) of the spools: worst for the cable that falls slack first and, where a largest
-            tension is given, for the cable that reaches it first.
-        centre: (1 or 2, k, 3) of the mass centre, likewise.
+        spools: (1 or 2, k, n_cables, 3) displacements of the spools that are worst for the cable that falls slack first
+            and, where a largest tension is given, for the cable that reaches it first.
+        centre: (1 or 2, k, 3) likewise displacements of the mass centre.
     """
 
     spools: np.ndarray
@@ -270,7 +271,7 @@ class WorstDisplacements(NamedTuple):
 
 @UNKNOWN
 def worst(enclosure: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
-    """Displacements that are worst to first order."""
+    """Displacements that are worst, to first order, for tensions."""
     uncertainty, index = requirements.uncertainty, np.arange(len(influence.mu))
     norm = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
     change = float(uncertainty.spool_positions) * norm
@@ -296,7 +297,7 @@ def fails(
     requirements: Requirements,
     multiple: Float[np.ndarray, "k"],
 ) -> Bool[np.ndarray, "k"]:
-    """Tell where a worst robot within a multiple of the uncertainty breaks a criterion in the middle of a block."""
+    """Tell where a robot with the worst displacements within a multiple fails a criterion in the middle of a block."""
     radii, limits = _radii(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
