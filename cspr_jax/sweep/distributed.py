@@ -188,7 +188,7 @@ class _Lost:
 
 
 def _is_reached(address: str) -> bool:
-    # dask retries for as long as a slow scheduler may take to answer; it also parses addresses.
+    # dask would retry for as long as a slow scheduler may take to answer; errors of addresses are left to it.
     url = urllib.parse.urlsplit(address if "://" in address else f"tcp://{address}")
     try:
         if url.scheme in ("tcp", "tls") and url.hostname and url.port is not None:

@@ -1,10 +1,10 @@
 """Workspaces: poses at which the cables of a robot can hold its effector, for any robot on any number of cables.
 
 Static, wrench-feasible and wrench-closure workspaces rest on one test: a pose is inside if along every facet normal
-(normal to dof - 1 columns of the wrench matrix) tensions within their limits supply the required wrenches. The least
-slack of all facet normals is the margin, in newtons, between two bounds that allow for rounding. Tensions over lengths
-make the wrench matrix affine in the position, so that whole cells of a grid can be proved. Clearances, speeds of
-cables, sets of orientations, sensitivities and feasible accelerations are here too.
+(normal to dof - 1 columns of the wrench matrix) tensions within their limits supply the required wrenches. The margin,
+in newtons, is the smallest slack of all facet normals, computed as two bounds that allow for rounding. With tensions
+over lengths as unknowns the matrix is affine in the position, so that full cells of a grid can be proved. The package
+also has clearances, speeds of cables, sets of orientations, sensitivities and feasible accelerations.
 
 Sources: hyperplane shifting by Bouchard, Gosselin and Moore (2010) and by Gouttefarde and Krut (2010); docs/theory.md
 has the formulas.
@@ -15,7 +15,7 @@ Files, each importing only from those above it:
     poses                 margins of poses, one by one and compiled
     requirements          conditions with their limits and wrenches
     search                margins and verdicts of many poses
-    cells                 proofs of whole cells
+    cells                 proofs of full cells
     all_robots            requirements of all robots within an uncertainty
     clearances            clearances of robots at rest
     static_poses          all conditions together, and sets of orientations

@@ -15,7 +15,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.wrench_sets import Faces
 
-# Number of positions computed at a time; fewer for robots on many cables, whose faces are many.
+# Number of positions computed at a time; it is lower for robots on many cables, which have many faces.
 BATCH = 4096
 _LARGEST_BATCH_ENTRIES = 1 << 22
 
@@ -25,7 +25,7 @@ def _batch_size(robot: PointMassRobot, power: int) -> int:
 
 
 def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationRanges:
-    """Dimensions of the sets of feasible accelerations at many positions."""
+    """Verdicts, margins and largest values of feasible accelerations at many positions."""
     kernel = partial(acceleration_ranges_at, robot, limits, touchable_limits(robot, limits))
     return in_batches(kernel, positions, batch_size=_batch_size(robot, 6))
 
@@ -55,7 +55,7 @@ def margins_and_verdicts(
     positions: Float[np.ndarray, "n 3"],
     accelerations: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Margins and verdicts of accelerations, one at each position, from faces as `verdict` takes them."""
+    """Margins and verdicts of accelerations, one at each position, from faces as in `verdict`."""
     return in_batches(
         partial(_margins_and_verdicts, robot),
         (faces, wider, positions, accelerations),

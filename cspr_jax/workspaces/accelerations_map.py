@@ -32,7 +32,7 @@ class FeasibleAccelerationMap(PointMassMap):
         return answers | {"verdict": answers["verdict"].astype(FLAGS)}
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse positions out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        """Refuse positions outside of the plane of a planar robot; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,9 +1,9 @@
-"""Requirements of all robots within an uncertainty: of the lightest and the heaviest one, wherever mass centres are.
+"""Requirements of all robots within an uncertainty: the lightest and the heaviest one, for all displaced mass centres.
 
-At a pose with given spools the wrenches that tensions within limits supply are a convex set, and those that a mass
-needs with its centre at a given position are linear in the mass: what both the smallest and the largest mass have, all
-masses between have. A force f that acts at a mass centre displaced by d adds d x f to the moment about its nominal
-position. For a vertical force these moments fill a disk; for forces of all directions they lie in a ball, though not
+At a pose with given spools, the wrenches that tensions within limits supply form a convex set, and the wrench that a
+mass centre at a given position requires is linear in the mass: if the smallest and the largest mass can be held, so can
+all masses between. A force f at a mass centre that is displaced by d adds d x f to the moment about the nominal
+position. For a vertical force these moments fill a disk; for forces of all directions they lie in a ball, although not
 every pair of force and moment occurs.
 """
 
@@ -24,11 +24,11 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 
 
 class MassSearch(NamedTuple):
-    """Searches for robots of one mass, spools at their positions.
+    """Searches for robots of one mass, with spools at their nominal positions.
 
     Fields:
-        enclosing: of wrenches that include those of all positions of the mass centre.
-        attained: of wrenches each of which some position of the mass centre needs.
+        enclosing: search with wrenches that include the wrenches for all positions of the mass centre.
+        attained: search with wrenches each of which some position of the mass centre requires.
     """
 
     enclosing: WorkspaceSearch
@@ -40,8 +40,8 @@ class AllRobots:
     """All robots within an uncertainty.
 
     Fields:
-        spools: how far each spool may be from its position, m.
-        searches: of each condition on the cables, for the masses that decide.
+        spools: largest distance of each spool from its nominal position, m.
+        searches: for each condition on the cables, searches for the decisive masses.
     """
 
     spools: float
@@ -56,7 +56,7 @@ def mass_searches(
     has_weight: bool,
     acceleration: float,
 ) -> list[MassSearch]:
-    """Searches of a condition for the masses that decide."""
+    """Searches of a condition for the decisive masses, the smallest and the largest."""
     is_closure = ask(robot).condition == CLOSURE
     total_acceleration = float(robot.gravity) * has_weight + acceleration
     factor = 1.0 if is_closure or total_acceleration == 0.0 else float(uncertainty.mass_factor)
@@ -78,7 +78,7 @@ def mass_searches(
 def _off_centre(
     robot: AnyRobot, wrenches: RequiredWrenches, radius: float, *, is_vertical: bool
 ) -> tuple[RequiredWrenches, bool]:
-    # Wrenches that include those of displaced mass centres, with moments up to `radius`; whether each is needed.
+    # Wrenches that include those of displaced mass centres, with moments up to `radius`, and whether all are required.
     row = PATTERNS[robot.pattern]
     axes = np.zeros(robot.dof)
     axes[len(row.forces) :] = radius

@@ -17,9 +17,9 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces.poses import geometry
 
 BATCH = 4096
-# Step of differences, over the size of the robot.
+# Step of finite differences, over the extent of the robot.
 STEP = 1e-7
-# Numbers of `schema.meanings.NEAREST_BODIES`; a pose with no body that could be met takes 0.
+# Numbers of `schema.meanings.NEAREST_BODIES`; 0 for a pose where no bodies can meet.
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
@@ -47,7 +47,7 @@ def nearer_exits(
     exits: Float[np.ndarray, "n n_cables 3"],
     distance: float,
 ) -> Iterator[np.ndarray]:
-    """Exits displaced so that, to first order, bodies come as near to each other as they can."""
+    """Exits with the displacements that, to first order, reduce clearances most."""
     step = STEP * float(np.ptp(exits, axis=(0, 1)).max())
 
     def at(exits: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def flags(distances: Clearances) -> Int[np.ndarray, "n"]:
         (distances.obstacles, Verdict.OBSTACLE),
         (distances.platform, Verdict.CABLE_PLATFORM),
     ):
-        # NaN compares as false: such poses stay open.
+        # Comparisons with NaN are false, so that such poses stay open.
         verdict |= np.where(values <= 0.0, flag, 0).astype(FLAGS)
     return np.where(distances.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
 

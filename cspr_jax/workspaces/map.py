@@ -33,7 +33,7 @@ from cspr_jax.workspaces.static_poses import MARGINS, OrientationSet, RestPoses,
 INTERFERENCE = "interference-free"
 TENSIONS = ("tension_min", "tension_max")
 SPEED = "cable_speed_max"
-# Sets of orientations divide pi into this many parts unless the file says otherwise.
+# Default number of parts into which sets of orientations divide pi.
 DIVISIONS = 12
 
 
@@ -104,14 +104,14 @@ class WorkspaceMap(GridMap):
         return cable_speeds(self._robot, np.asarray(maximum), speed=speed, angular_speed=angular_speed)
 
     def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
-        # Return quaternions (k, 4) in the kernels' axes.
+        # Quaternions (k, 4) in the kernels' axes.
         units = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
         if self._row.is_planar and units[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
         return self._frame.rotated_quaternions(units)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
-        # Return orientations (k, 4), None where there is no set, and the part of the set that each stands for.
+        # Orientations (k, 4) of the set, and the fraction of the set that each represents; None without a set.
         workspace = self._workspace
         if workspace.orientations is None:
             return None, np.ones(1)
@@ -194,7 +194,7 @@ class WorkspaceMap(GridMap):
         return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # Return half sizes (n, 3) of the cells: half of the distance to the farther neighbour along each axis.
+        # Half of the extents (n, 3) of the cells: half of the distance to the farther neighbour along each axis.
         half_sizes = []
         for name in "xyz":
             points = np.sort(axis_points(getattr(self._keys.axes, name)))
@@ -204,7 +204,7 @@ class WorkspaceMap(GridMap):
         return np.stack(half_sizes, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse positions out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        """Refuse positions outside of the plane of a planar robot; see `GridMap.refuse_hopeless`."""
         row = self._row
         if row.is_planar and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")

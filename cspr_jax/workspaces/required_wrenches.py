@@ -17,8 +17,8 @@ class RequiredWrenches:
     """Wrenches that cables must supply: all sums of a wrench of a finite set, one of a box and one of each ellipsoid.
 
     Fields:
-        points: (k, dof) the finite set, N and N m, or with moments over a length, as the kernels take it; None: the
-            weight of a body on a joint, which depends on the orientation.
+        points: (k, dof) the finite set, N and N m, or with moments over a length for kernels; None: the weight of a
+            body on a joint, which depends on the orientation.
         box: (dof,) half widths of a box about zero; None: there is none.
         ellipsoids: (dof,) semi-axes of each ellipsoid about zero.
     """
@@ -34,12 +34,12 @@ class RequiredWrenches:
         return RequiredWrenches(points, box, tuple(axes / unit for axes in self.ellipsoids))
 
     def about(self, wrench: Float[np.ndarray, "dof"]) -> "RequiredWrenches":
-        """The same box and ellipsoids about one wrench, which takes the place of the finite set."""
+        """The same box and ellipsoids about one wrench, which replaces the finite set."""
         return dataclasses.replace(self, points=wrench[None])
 
     @property
     def corners(self) -> np.ndarray:
-        """(n, dof) the finite set, at every corner of the box."""
+        """Sums of each wrench of the finite set and each corner of the box, (n, dof)."""
         if self.points is None:
             raise TypeError(NO_POINTS)
         half = np.zeros(self.points.shape[1]) if self.box is None else self.box
@@ -48,14 +48,14 @@ class RequiredWrenches:
 
     @property
     def enclosing(self) -> "RequiredWrenches":
-        """Wrenches that include all of these, with a box about each ellipsoid in its place."""
+        """Larger set of wrenches, in which a box about each ellipsoid replaces it."""
         if not self.ellipsoids:
             return self
         box = sum(self.ellipsoids) if self.box is None else self.box + sum(self.ellipsoids)
         return dataclasses.replace(self, box=np.asarray(box), ellipsoids=())
 
     def supports(self, normals: Float[np.ndarray, "n dof"]) -> Float[np.ndarray, "n"]:
-        """Largest products of normals with the wrenches."""
+        """Largest product of each normal with the wrenches."""
         if self.points is None:
             raise TypeError(NO_POINTS)
         products = (self.points @ normals.T).max(0)
@@ -76,5 +76,5 @@ class RequiredWrenches:
 
     @property
     def magnitude(self) -> float:
-        """Largest absolute component; 0 for a weight that is not known."""
+        """Largest absolute component; 0 for a weight that depends on the orientation."""
         return max((float(np.abs(part).max()) for part in self.spanning), default=0.0)

@@ -18,21 +18,21 @@ from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
-# Largest number of choices of dof - 1 cables: with so many a pose takes seconds, and as many megabytes.
+# Largest number of choices of dof - 1 cables, with which a pose takes seconds, and megabytes of memory.
 MAX_CHOICES = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
 class Requirement:
-    """Requirement that each pose has to meet.
+    """Requirement that each pose must meet.
 
     Fields:
         condition: one of `CONDITIONS`.
         low: (n_cables,) smallest tensions, N.
         high: (n_cables,) largest tensions, inf for none, N.
         wrenches: wrenches that the cables must supply, kernels' axes, N and N m.
-        capacity_length: length by which moments are divided, m, for the capacity margin; None: the margin is that of
-            the tensions.
+        capacity_length: length by which moments are divided for the capacity margin, m; None: the margin is that of
+            tensions.
     """
 
     condition: str
@@ -43,7 +43,7 @@ class Requirement:
 
 
 def check_cables(robot: AnyRobot) -> None:
-    """Refuse robots with too many cables: the number of choices of cables grows with a power of it."""
+    """Refuse robots with too many cables, since the number of choices grows with a power of their number."""
     if math.comb(robot.n_cables, robot.dof - 1) > MAX_CHOICES:
         maximum = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MAX_CHOICES)
         allowed = f"at most {maximum} for workspaces of {robot.dof} degrees of freedom"
@@ -65,7 +65,7 @@ def requirement(
 
 
 def _weight(robot: AnyRobot) -> RequiredWrenches:
-    # Return the wrench that holds the robot still; that of a body on a joint depends on the orientation.
+    # Wrench that holds the robot at rest; for a body on a joint it depends on the orientation.
     if PATTERNS[robot.pattern].is_jointed:
         return RequiredWrenches(None)
     wrench = np.zeros((1, robot.dof))
@@ -82,7 +82,7 @@ def required_wrenches(
     ellipsoid: Any = None,
     acceleration: Any = None,
 ) -> RequiredWrenches:
-    """Wrenches that cables must supply, as the kernels take them: all sums of one wrench of each given set."""
+    """Wrenches that cables must supply, for the kernels: all sums of one wrench of each given set."""
     row, ellipsoids = PATTERNS[robot.pattern], list[np.ndarray]()
     required = _weight(robot)
     if points is not None:

@@ -1,7 +1,7 @@
 """Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
 
-A pose is answered by the fastest method first, then by more accurate ones until rounding cannot change the answer: the
-null space of six to eight cables in space, the normals to dof - 1 cables, singular values.
+Each pose is tried by the fastest method first, then by more accurate ones until rounding cannot change the answer: by
+the null space of six to eight cables in space, by the normals to dof - 1 cables, and by singular values.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from cspr_jax.workspaces.poses.margins import Wrenches
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 
-# Bounds of a margin in single precision may differ by this part of the largest limit.
+# Largest difference of the bounds of a margin in single precision, as a fraction of the largest limit.
 SINGLE_ERROR = 1e-3
 PART = 1 << 18
-# Poses of a batch where poses are few, and where a search is prepared.
+# Number of poses of a short batch, for few poses and for preparing a search.
 BATCH = 1024
-MAX_SHORT = 8  # short batches
-# Bytes of the wrench matrices of a batch where poses are many: large beside the start of a call, and small enough for
-# caches to hold most of them.
+MAX_SHORT = 8  # largest number of short batches
+# Bytes of the wrench matrices of a long batch, for many poses: large enough to outweigh the overhead of a call, small
+# enough that caches hold most of them.
 BYTES = 6_400_000
-TRIALS = 200  # poses by which the base block is chosen
-FEW_TRIALS = 8  # poses by which choices of cables without a facet are left out
-# Number of boxes in which such poses are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
+TRIALS = 200  # number of poses by which the base block is chosen
+FEW_TRIALS = 8  # number of poses by which choices of cables without a facet are found
+# Number of boxes in which such poses are sampled, each twice as wide as the one before, for pulleys of up to 1e6 m.
 WIDENINGS = 40
-# If no more poses than this are open, singular values answer them at once: compiling would take longer.
+# Up to this number of open poses, singular values answer them at once, since compiling would take longer.
 FEW = 100
 
 
@@ -53,10 +53,9 @@ class WorkspaceAnswers(Columns):
 
     Fields:
         verdict: (n,) flags of `Verdict`; 0: the pose belongs to the workspace. Singular: the cables do not span a
-            wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits, unless these may be
-            touched.
-        margin: (n,) distance that tensions can keep from their limits, N, negative outside; inf where nothing bounds
-            it, -inf where the cables do not span the wrench. For wrench closure a pure number in [-1, 1].
+            required wrench. Undecided: on the boundary, within 1e-9 of the limits, unless these may be touched.
+        margin: (n,) largest distance that tensions can keep from their limits, N, negative outside; inf where it is
+            unbounded, -inf where the cables do not span the wrench. For wrench closure a pure number in [-1, 1].
         is_exact: (n,) whether the pose was answered by singular values.
     """
 
@@ -66,7 +65,7 @@ class WorkspaceAnswers(Columns):
 
 
 class Poses(NamedTuple):
-    """Poses, and wrenches that the cables must supply at each.
+    """Poses, with the wrenches that the cables must supply at each.
 
     Fields:
         positions: (n, 3) m.
@@ -88,19 +87,19 @@ Stage = Callable[[Poses], np.ndarray]
 
 
 class WorkspaceSearch:
-    """Search for poses of one robot that meet a requirement; all that depends on the robot alone is prepared once.
+    """Search for poses of a robot that meet a requirement; data that depend only on the robot are prepared once.
 
     Fields:
-        robot: centred, z down.
-        requirement: what each pose has to meet.
+        robot: robot, centred, z down.
+        requirement: requirement that each pose must meet.
         unit: (dof,) divisors of the components of wrenches: for moments a length of the robot, m.
     """
 
     def __init__(self, robot: AnyRobot, requirement: Requirement, *, precision: str = "float64") -> None:
         """Prepare the search for a robot, centred, z down.
 
-        With precision "float32" single precision decides poses where it can, with margins accurate to 1e-3 of the
-        limits, and float64 the others.
+        With precision "float32", poses are decided in single precision where it suffices, with margins accurate to 1e-3
+        of the limits, and otherwise in float64.
         """
         self.robot, self.requirement, self._precision, self._length = robot, requirement, precision, _length(robot)
         self.unit = np.where(geometry.scales(robot), self._length, 1.0)
@@ -143,12 +142,12 @@ class WorkspaceSearch:
         return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
 
     def _trials(self) -> np.ndarray:
-        # Return finite wrench matrices of poses among the spools: no cable ends within its pulley there. Large pulleys
-        # may leave no such pose among the spools, but do farther out.
+        # Finite wrench matrices of sampled poses among the spools, at which no cable ends within its pulley. If pulleys
+        # are large there may be such poses only farther out.
         rng, base, row = np.random.default_rng(1), np.asarray(self.robot.base_points), PATTERNS[self.robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
-        # If all spools have the same x, some components vanish only in their plane: leave it.
+        # If all spools have the same x, some components vanish only in their plane: sample outside of it.
         moves = np.isin(range(3), row.forces or range(3))
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
         regular = np.zeros((0, self.robot.dof, self.robot.n_cables))
@@ -165,7 +164,7 @@ class WorkspaceSearch:
         raise InputError("pulley_radius", None, allowed, problem="none among the spools, nor around them")
 
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        # Return wrench matrices, moments over the length.
+        # Wrench matrices with moments over the length.
         poses = positions, quaternions
         matrices = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=TRIALS)
         return matrices / self.unit[:, None]
@@ -197,7 +196,7 @@ class WorkspaceSearch:
             is_beyond = (bounds.real > self._boundary) | (bounds.imag < -self._boundary)
             return is_beyond & is_known(bounds, SINGLE_ERROR / BOUNDARY)
 
-        if not len(self._choices.table):  # whatever the pose, the cables do not span all components
+        if not len(self._choices.table):  # at all poses, the cables do not span all components
             return
 
         if self._precision == "float32":
@@ -207,7 +206,7 @@ class WorkspaceSearch:
         yield self._stage(np.float64, False), is_known
 
     def batch(self, dtype: type) -> int:
-        """Length of a batch on a CPU where poses are many."""
+        """Length of a long batch on a CPU."""
         entries = self.robot.dof * self.robot.n_cables
         return 1 << int(np.log2(BYTES / (entries * np.dtype(dtype).itemsize)))
 
@@ -248,7 +247,7 @@ class WorkspaceSearch:
             quaternions = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), quaternions, loads
-            # Use two lengths only, since each is compiled.
+            # Use only two lengths, since code is compiled for each.
             length = BATCH if len(poses.positions) <= MAX_SHORT * BATCH else self.batch(dtype)
             return in_batches(lambda x: compiled(*x), batch, batch_size=length)
 
@@ -256,7 +255,7 @@ class WorkspaceSearch:
 
     @property
     def _relations(self) -> facet_normals.CableSubsets:
-        # Return only the cables of each facet normal, in the order of the block.
+        # Cables of each facet normal alone, in the order of the block.
         table, counts = self._choices
         indices = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(indices, axis=1)
@@ -277,7 +276,7 @@ class WorkspaceSearch:
 
     @property
     def _fixed(self) -> Wrenches:
-        # Return the required wrenches that do not depend on the pose, as that of a body on a joint does.
+        # Required wrenches for kernels, except the weight of a body on a joint, which depends on the pose.
         required = self._wrenches
         points = [] if required.points is None else [[as_float64(x) for x in point] for point in required.points]
         return Wrenches(
@@ -287,7 +286,7 @@ class WorkspaceSearch:
         )
 
     def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:
-        # Poses whose tensions touch limits, or nearly do, and keep wider limits: by as much as limits may be missed.
+        # Poses at which tensions touch or slightly exceed limits, but keep the limits widened by the allowance.
         low, high = self.requirement.low, self.requirement.high
         rows = np.flatnonzero(np.abs(margin) <= TOUCHED / BOUNDARY * self._boundary)
         if self._measure == "closure" or not (low.any() or np.isfinite(high).any()) or not len(rows):
@@ -316,7 +315,7 @@ class WorkspaceSearch:
 
 
 def _length(robot: AnyRobot) -> float:
-    # Return the size of the platform, by which moments are divided.
+    # Length of the platform by which moments are divided.
     if not isinstance(robot, PlatformRobot):
         return 1.0
     points = np.asarray(robot.platform_points)

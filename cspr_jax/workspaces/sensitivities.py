@@ -20,7 +20,7 @@ from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.statics.reference_pose import aligned
 from cspr_jax.robots.statics.sensitivities import Sensitivities, pair_sensitivities, sensitivities
 
-BATCH = 8192  # positions at a time
+BATCH = 8192  # number of positions computed at a time
 
 
 @jax.jit
@@ -40,16 +40,16 @@ def _of_pairs(geometry, positions) -> Sensitivities:
 
 
 class SensitivitySearch:
-    """The sensitivities of a robot.
+    """Sensitivities of a robot at positions.
 
     A platform whose cables form three parallel pairs has the orientation of its file, in which they are parallel; any
-    other platform has its reference orientation. `robot` has the axes in which it is not rotated.
+    other platform has its reference orientation. `robot` has platform axes in which that orientation is no rotation.
 
     Args:
-        robot: centred; a platform in the axes of its file.
+        robot: centred robot; a platform in the axes of its file.
 
     Raises:
-        InputError: what `check_determined` refuses.
+        InputError: `check_determined` refuses the robot.
     """
 
     def __init__(self, robot: PointMassRobot | PlatformRobot) -> None:

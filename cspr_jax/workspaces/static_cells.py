@@ -1,4 +1,4 @@
-"""Whole cells of maps of workspaces against all conditions of a workspace. Arrays in, answers out."""
+"""Proofs of full cells of maps for all conditions of a workspace together. Arrays in, answers out."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.static_poses import RestPoses
 
-# How often open cells are halved along each axis.
+# Number of times that open cells are halved along each axis.
 DEPTH = 2
 # Error of distances, m: far above the rounding of coordinates below 1e6 m, far below measurable distances.
 CLOSE = 1e-9
@@ -31,15 +31,15 @@ LIMITS = {"floor_margin": "floor", "length_margin": "cable lengths", "speed_marg
 
 
 class RestCells:
-    """Proofs, at one orientation, that whole cells lie on one side of a workspace.
+    """Proofs, at one orientation, that full cells lie on one side of a workspace.
 
-    While a robot moves by a distance without turning, its heights and the lengths of its cables change by no more than
-    this distance; `workspaces.cells.shifts` bounds the change of speeds of cables. With an uncertainty, a pose is
-    inside if it is so for all robots, and outside if it is so for one; single poses are cells without extent.
+    While a robot translates, its heights and the lengths of its cables change by at most the distance that it moves;
+    `workspaces.cells.shifts` bounds the change of speeds of cables. With an uncertainty, a pose is inside if it is
+    for all robots, and outside if it is for one; single poses are cells of zero extent.
     """
 
     def __init__(self, poses: RestPoses, quaternion: np.ndarray, all_robots: AllRobots | None = None) -> None:
-        """Prepare the proofs, for a unit quaternion (4,), scalar first; without pulleys if for all robots."""
+        """Prepare the proofs for a unit quaternion (4,), scalar first; proofs for all robots exclude pulleys."""
         self._poses, self._robot, self._quaternion, self._all_robots = poses, poses.robot, quaternion, all_robots
         self._spools = 0.0 if all_robots is None else all_robots.spools
         single = {name: [MassSearch(one, one)] for name, one in poses.searches.items()}
@@ -52,7 +52,7 @@ class RestCells:
         self._names += [LIMITS[name] for name, *_ in poses.limited(np.zeros((1, 3)), self._turns(1))]
 
     def _mass_proofs(self, searches: MassSearch) -> tuple[CellProofs, CellProofs, WorkspaceSearch]:
-        # Proofs that cells are inside, and outside, and the search for what may be outside.
+        # Proofs that cells are inside, proofs that they are outside, and the search for poses that may be outside.
         enclosing, attained = searches
         outside = CellProofs(attained, self._quaternion, self._spools)
         inside = outside if enclosing is attained else CellProofs(enclosing, self._quaternion, self._spools)
@@ -61,7 +61,7 @@ class RestCells:
     def __call__(
         self, origins: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"], *, depth: int = DEPTH
     ) -> tuple[Int[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-        """Tell which cells are proved to lie wholly on one side of the workspace."""
+        """Tell which cells are proved to lie fully on one side of the workspace."""
         sides, reasons = np.zeros(len(origins), np.int16), np.zeros(len(origins), np.int16)
         numbers = np.array([OPEN_CONDITIONS.index(name) for name in self._names])
         with double_precision():
@@ -71,7 +71,7 @@ class RestCells:
                 held = np.zeros((len(centres), len(numbers)), bool)
                 result = proved_sides(self, origins[part], half[part], centres, held, depth)
                 sides[part] = np.where(result.proved, np.where(centres > 0, 1, 2), 0)
-                # The first of several conditions.
+                # Report the first of several open conditions.
                 open_condition = numbers[np.argmin(result.held, axis=1)]
                 is_border = result.mixed | (centres == 0)
                 reason = np.where(is_border, OPEN_CONDITIONS.index("boundary"), open_condition)
@@ -93,7 +93,7 @@ class RestCells:
         if self._all_robots is None:
             return verdict
         verdict, chosen = verdict.copy(), np.flatnonzero(verdict == 0)
-        # These hold for all robots where they do for one.
+        # Conditions that hold for all robots if they hold for one.
         are_same = [name == "floor" or (not self._spools and name != "tensions") for name in self._names]
         for side in (1, -1):
             if len(chosen) == 0:
@@ -130,14 +130,14 @@ class RestCells:
             held[:, k] |= low > CLOSE
             is_broken |= high < -CLOSE
         if self._robot.pulleys is not None:
-            # An attachment point within a pulley has no free cable.
+            # There is no free cable if an attachment point may be within its pulley.
             held &= (moved.free > 0.0).all(1, keepdims=True)
         return held, is_broken
 
     def _distances(
         self, positions: np.ndarray, mass_positions: np.ndarray, half: np.ndarray, moved: Shifts, sides: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        # Yield bounds (n,) of the smallest slack of clearances and of each limit: of all robots, and of one.
+        # Yield bounds (n,) of the smallest slacks of clearances and of each limit: for all robots, and for one.
         poses, turns = self._poses, self._turns(len(positions))
         if poses.around is not None and self._has_contacts:
             yield self._clearances(poses.around, mass_positions, half, moved, sides)

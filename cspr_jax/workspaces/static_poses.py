@@ -1,4 +1,4 @@
-"""Poses at rest, and sets of orientations at positions, against all conditions of a workspace; arrays in and out."""
+"""Poses at rest, and sets of orientations, tested for all conditions of a workspace; arrays in, answers out."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MARGINS = (
 )
 NEAREST = "nearest_bodies"
 BATCH = 4096
-# Poses that are answered at a time, where each position has many orientations.
+# Number of poses that are tested at a time where each position has many orientations.
 AT_ONCE = 1 << 19
 
 PoseColumns = dict[str, np.ndarray]
@@ -41,16 +41,16 @@ OrientationSet = Literal["inclusion", "total"]
 
 @dataclasses.dataclass(frozen=True)
 class RestPoses:
-    """Conditions that a pose at rest is to meet.
+    """Conditions that a pose at rest must meet.
 
     Fields:
-        robot: centred, z down.
-        searches: search of each condition on the cables.
-        around: bodies that the cables may not meet, each other included; None: contacts do not count.
-        limits: floor and largest cable lengths, kernels' axes; limits of tensions are those of the searches.
-        speeds: velocities that the robot must be able to have; None: speeds do not count.
-        capacity: search for the capacity margin, which has no part in the verdict; None: there is none.
-        of_mass_centre: whether positions are those of the mass centre, and not of the origin of the platform frame.
+        robot: robot, centred, z down.
+        searches: searches of all conditions on the cables.
+        around: bodies that must not touch, cables included; None: contacts do not count.
+        limits: floor and largest cable lengths, kernels' axes; the searches have limits of tensions.
+        speeds: required velocities of the effector; None: speeds do not count.
+        capacity: search for the capacity margin, which does not affect verdicts; None: it is not requested.
+        of_mass_centre: whether positions are of the mass centre instead of the origin of the platform frame.
     """
 
     robot: AnyRobot
@@ -112,7 +112,7 @@ class RestPoses:
     def limited(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Iterator[tuple[str, Verdict, np.ndarray, np.ndarray]]:
-        """Quantity, flag and slacks of each limit, and by how much it may be missed."""
+        """Quantity, flag, slacks and allowance of each limit."""
         centres = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             slack, radius = float(self.limits.floor) - self._depths(centres, quaternions), spool_radius(self.robot)
@@ -146,7 +146,7 @@ def over_orientations(
 
 
 def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
-    # Reduce columns (n_positions, n_orientations) to columns (n_positions,).
+    # Reduce columns (n_positions, n_orientations) to columns (n_positions,) about the set.
     verdict = columns["verdict"]
     inside = verdict == 0
     is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
@@ -156,7 +156,7 @@ def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationS
     else:
         best, is_met = np.fmin.reduce, inside.all(1)
         may_be = ~is_met & (inside | is_open).all(1)
-    # A refuted set has the reasons of its refuted orientations, even if others are open.
+    # A refuted set gets the reasons of its refuted orientations, even if other orientations are open.
     reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
     best_values = {name: best(columns[name], axis=1) for name in MARGINS}
     at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)
@@ -165,7 +165,7 @@ def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationS
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:
-    # Return for each row its most frequent flags among the entries that are not 0.
+    # Most frequent flags of each row among its nonzero entries.
     values = np.unique(verdict[verdict != 0])
     if len(values) == 0:
         return np.zeros(len(verdict), FLAGS)

@@ -1,4 +1,4 @@
-"""Proofs of cells at one orientation, without halving: that they lie wholly inside a workspace, or wholly outside."""
+"""Proofs, without halving, that cells at one orientation lie fully inside or outside of a workspace."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from cspr_jax.workspaces.cells.worst_facet_normals import worst_facets
 from cspr_jax.workspaces.requirements import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-PART = 256  # cells that are proved at a time, so that their arrays fit a cache
-BATCH = 1024  # poses whose facet normals are compared at a time
-# Tensions at the centre keep this fraction of the margin from their limits. At the full margin only one point is left,
-# which rounding can miss.
+PART = 256  # number of cells that are proved at a time, so that their arrays fit into a cache
+BATCH = 1024  # number of poses whose facet normals are compared at a time
+# Distance of tensions at the centre from their limits, as a fraction of the margin: at the full margin only one point
+# is feasible, which rounding may exclude.
 KEPT = 0.98
-# Rounds in which displacements of spools are sought with which a wrench is out of reach.
+# Number of rounds of the search for displacements of spools with which a wrench cannot be supplied.
 ROUNDS = 2
 
 
 class CellProofs:
     """Proofs of cells at one orientation, without halving.
 
-    Inside holds for all robots whose spools are within a distance of their positions, outside for one of them.
+    `inside` holds for all robots whose spools are within a distance of their positions, `outside` for one of them.
     """
 
     def __init__(self, search: WorkspaceSearch, quaternion: np.ndarray, spools: float = 0.0) -> None:
-        """Prepare the proofs of the requirement of a search, for its robot; a distance of spools excludes pulleys."""
+        """Prepare proofs for the robot and requirement of a search; displaced spools exclude pulleys."""
         robot = search.robot
         self._robot, self._search, self._quaternion, self._spools = robot, search, quaternion, spools
         self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
@@ -51,7 +51,7 @@ class CellProofs:
         self._spreads = np.reshape(required.ellipsoids, (-1, robot.dof))
         self._boxed = search
         if required.ellipsoids:
-            # Margins of all wrenches of the boxes about the ellipsoids.
+            # Wrenches that include all required ones, with boxes about the ellipsoids.
             loads = search.requirement.wrenches.enclosing
             self._boxed = WorkspaceSearch(robot, dataclasses.replace(search.requirement, wrenches=loads))
         self._subsets = spanning(robot.n_cables, robot.dof)
@@ -64,7 +64,7 @@ class CellProofs:
         return np.einsum("nik,kmi->nmi", unit_vectors(exits - positions[:, None]), self._forces)
 
     def inside(self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-        """Tell whether cells lie wholly inside."""
+        """Tell whether cells are proved to lie fully inside."""
         if not (self._spools or half.any()):
             return self._search(positions, np.tile(self._quaternion, (len(positions), 1))).verdict == 0
         return self.lower_margins(positions, half) > 0.0
@@ -77,7 +77,7 @@ class CellProofs:
         units, count = self._matrices(positions, exits), len(self._arms)
         low, high, loads = self._requirement.low, self._requirement.high, self._enclosing
         margin = self._boxed(positions, np.tile(self._quaternion, (len(positions), 1))).margin
-        if self._is_closure:  # tensions without a wrench
+        if self._is_closure:  # tensions that give no wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             slack = np.ones((1, 1))
         else:
@@ -93,7 +93,7 @@ class CellProofs:
         return np.concatenate(in_parts(part, len(positions), PART))
 
     def outside(self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-        """Tell whether cells lie wholly outside."""
+        """Tell whether cells are proved to lie fully outside."""
         low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)
         condition = "closure" if self._is_closure else "tensions"
@@ -129,9 +129,9 @@ class CellProofs:
     def _displacements(
         self, positions: np.ndarray, exits: np.ndarray, normals: np.ndarray, held: np.ndarray, loads: np.ndarray
     ) -> np.ndarray:
-        # Displacements of spools, (n, n_cables, 3) m, with which, to first order, tensions supply least along normals.
-        # Cables along a normal are at their limits; the cables that it is normal to have the tensions that then come
-        # nearest to the wrench.
+        # Displacements of spools, (n, n_cables, 3) m, with which, to first order, tensions supply the smallest wrench
+        # along given normals. Cables that act along a normal are at their limits; the others have the tensions that then
+        # come nearest to the wrench.
         matrices, units = self._matrices(positions, exits), unit_vectors(exits - positions[:, None])
         effects = np.einsum("nm,kmi->nik", normals, self._forces)
         products = (effects * units).sum(2)
@@ -148,11 +148,11 @@ class CellProofs:
         return -self._spools * unit_vectors(tensions[..., None] * (effects - products[..., None] * units))
 
     def _exits(self, positions: np.ndarray) -> np.ndarray:
-        # Points at which cables leave, less the arms of their attachment points, (n, n_cables, 3).
+        # Points at which cables leave, minus the arms of their attachment points, (n, n_cables, 3).
         return leaving_points(self._robot, positions, self._quaternion) - self._arms
 
     def _moves(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
-        # How far exits move, (n, n_cables); infinite where an attachment point might be within its pulley.
+        # Largest movement of exits, (n, n_cables); infinite where an attachment point may be within its pulley.
         if self._robot.pulleys is None:
             return np.zeros((len(positions), len(self._arms)))
         turns = np.tile(self._quaternion, (len(positions), 1))

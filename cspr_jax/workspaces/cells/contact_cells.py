@@ -4,9 +4,9 @@ While a robot moves within a cell without turning, every point of its bodies is 
 of pulleys, which stay within balls, and the ends of the parts of cables that are left out next to a platform, whose
 terms of second order are bounded. As over blocks of time (`robots.contacts.convex_gaps`), the distance of two convex
 bodies is at least the smallest component, along any direction, of the vectors between their corners. The direction is
-that of the nearest points at the centre, and turns with x as they do there, n(x) = n + sum_k x_k n_k, so that the
-components are quadratic in x and the bounds lose terms of second order alone. From above the distance is that of two
-fixed points of the bodies, which is largest at a corner of the cell.
+that between the nearest points at the centre and turns with x as it does there, n(x) = n + sum_k x_k n_k, so that the
+components are quadratic in x and errors of the bounds are of second order. The upper bound is the distance of two fixed
+points of the bodies, which is largest at a corner of the cell.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.workspaces.cells.cells import smallest_quadratic
 
 BATCH = 512
-# Error of distances over the largest coordinate: far above the rounding of bounds, far below measurable distances.
+# Error of distances over the largest coordinate: far above rounding errors of bounds, far below measurable distances.
 DISTANCE_ERROR = 1e-12
-# The second derivative of r / |r| is no longer than this over |r|^2; half of it counts.
+# Half of the largest norm of the second derivative of r / |r|, times |r|^2.
 UNIT_CURVATURE = 0.5 * np.sqrt(4.0 / 3.0)
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -50,12 +50,12 @@ Range = tuple[Array, Array]
 
 
 class CellPoints(NamedTuple):
-    """Points (m, ...) while a robot moves within a cell: `middle` + `jacobian` x, up to `radius`.
+    """Points (m, ...) while a robot moves within a cell: within `radius` of `middle` + `jacobian` x.
 
     Fields:
-        middle: (m, 3) m.
-        jacobian: (m, 3, 3) changes with each component of x, in columns, m.
-        radius: (m,) m.
+        middle: (m, 3) points at the centre of the cell, m.
+        jacobian: (m, 3, 3) derivatives with respect to x, one column for each component, m.
+        radius: (m,) largest distance from the linear function, m.
     """
 
     middle: Any
@@ -74,7 +74,7 @@ class CellPoints(NamedTuple):
 
 
 class _CellLanes(NamedTuple):
-    # Position (3,) and half sizes (3,); exits of the cables (n_cables, 3), and how far they move (n_cables,), m.
+    # Position (3,) and half extents (3,); exits of the cables (n_cables, 3), and their movements (n_cables,), m.
     position: Any
     half: Any
     exits: Any
@@ -90,7 +90,7 @@ def clearance_bounds(
     exits: Float[np.ndarray, "n n_cables 3"],
     shifts: Float[np.ndarray, "n n_cables"],
 ) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-    """Bounds of the least clearance in cells."""
+    """Bounds of the smallest clearance in cells."""
     bodies, rotation = bodies_of(robot, scene), np.asarray(matrix(jnp.asarray(quaternion)))
     body = None if bodies.body is None else _rotated(bodies.body, rotation)
     rotated = bodies._replace(points=bodies.points @ rotation.T, body=body)
@@ -143,7 +143,7 @@ def _fixed(corners: Array) -> CellPoints:
 
 
 def _gap(first: Solid, second: Solid) -> Range:
-    # Bound the distance of two bodies whose corners are `CellPoints`: from below where they are proved to be apart.
+    # Bound the distance of two bodies whose corners are `CellPoints`; from below only where they are proved separated.
     p, q = first.corners, second.corners
     features = nearest_features(p.middle, q.middle, first, second)
 
@@ -172,7 +172,8 @@ def _gap(first: Solid, second: Solid) -> Range:
 
 
 def _depth(body: Solid, planes: FacePlanes) -> Array:
-    # Bound how deep a body reaches behind planes, by points of its edges; inf where it is not proved to.
+    # Upper bound of the signed distance of a body from a fixed one, by points of its edges; inf where it is not proved
+    # that they overlap.
     start, end = (body.corners.middle[body.edges[:, k]] for k in range(2))
     part = inner_fractions(start, end, planes)[:, None]
     count = len(body.corners.middle)
@@ -209,13 +210,13 @@ def _from_obstacles(bodies: Bodies, points: CellPoints, solid: Any, planes: Face
 
 
 def _seen(corners: Array, platform: CellPoints) -> CellPoints:
-    # Points fixed in space, as a platform sees them that moves as its first corner does.
+    # Points fixed in space, in the axes of a platform that moves like its first corner.
     jacobian = jnp.broadcast_to(-platform.jacobian[0], (len(corners), 3, 3))
     return CellPoints(corners, jacobian, jnp.zeros(len(corners)))
 
 
 def _from_platform(bodies: Bodies, shape: Shape, cell: _CellLanes) -> Range:
-    # Seen from the platform its shape and the attachment points do not move.
+    # In the axes of the platform its shape and the attachment points do not move.
     ray, moved = cell.exits - cell.position[None] - bodies.points, -jnp.diag(cell.half)
     length, radius = jnp.sqrt(jnp.sum(ray**2, axis=1)), jnp.sqrt(jnp.sum(cell.half**2)) + cell.shifts
     unit, shortest = ray / length[:, None], length - radius
@@ -233,6 +234,6 @@ def _from_platform(bodies: Bodies, shape: Shape, cell: _CellLanes) -> Range:
         return low, jnp.minimum(high, _depth(Solid(cable, *SEGMENT), shape.planes))
 
     low, high = jax.vmap(one)(ends)
-    # A cable that may be as short as the part that is left out is not checked.
+    # A cable that may be no longer than the part that is left out has no bounds.
     is_long = shortest > bodies.leave
     return jnp.where(is_long, low, -jnp.inf) - bodies.radii, jnp.where(is_long, high, jnp.inf) - bodies.radii

@@ -5,17 +5,18 @@ With force densities f0 at the centre, Z0 f0 = w, and weights D, the force densi
     f(x) = f0 + D U^T (I - T)^-1 j,    C^-1 Z0 D = U,    T = sum_k x_k T_k,    j = sum_k x_k j_k,
     T_k = C^-1 N_k D U^T,    j_k = C^-1 N_k f0
 
-satisfy Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: to first order, f moves from f0 by the
-least sum of (df_i / D_i)^2. D_i is the distance of f0_i from its limits, so that tensions near a limit hardly move.
-Then
+satisfy Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: to first order, the change of f from
+f0 has the smallest sum of (df_i / D_i)^2. D_i is the distance of f0_i from its limits, so that tensions near a limit
+hardly change. Then
 
     f_i(x) = f0_i + D_i (U_i . j + U_i . T j + e_i),    |e_i| <= |U_i| |T| |T j| / (1 - |T|),
 
 and the tension is its product with L_i(x), which lies between L0_i - u_i . dp and the same plus
-|dp|^2 / (2 (L0_i - |dp|)). Where exits may be off by s_i, -A_i s_i f0_i adds to C j, and u_i . s_i to the length: the
-effects of each exit on a tension are added as vectors, so that one that moves along its own cable changes nothing to
-first order; all else that they do is bounded by norms. The bounds allow for rounding of C, so that C^-1 Z0 D U^T is not
-quite I and Z0 f0 not quite w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
+|dp|^2 / (2 (L0_i - |dp|)). Where exits may be displaced by s_i, -A_i s_i f0_i adds to C j, and u_i . s_i to the length:
+both effects of an exit on a tension are added as vectors, so that a displacement along the exit's own cable has no
+effect to first order; all other effects are bounded by norms. The bounds allow for rounding of C, because of which
+C^-1 Z0 D U^T is not exactly I and Z0 f0 not exactly w. Where |T| < 1 the rank of Z(x) is full, too, since
+C^-1 Z(x) D U^T = I - T.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ from cspr_jax.workspaces.cells.cells import (
 
 
 class _DensityChange(NamedTuple):
-    # Relative change of the force densities over a cell: terms of first and second order in x, of first order in what
-    # exits are off, and a bound of the rest.
+    # Relative change of the force densities over a cell: terms of first and second order in x, terms of first order in
+    # displacements of exits, and a bound of the rest.
     linear: np.ndarray  # (n, n_cables, 3)
     quadratic: np.ndarray  # (n, n_cables, 3, 3)
     exits: np.ndarray  # (n, n_cables, n_exits, 3) 1/m
@@ -72,7 +73,7 @@ def tension_bounds(
     low: Float[np.ndarray, "n_cables"],
     high: Float[np.ndarray, "n_cables"],
 ) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
-    """Bounds of tensions that give a wrench everywhere in cells."""
+    """Bounds of tensions that give a wrench at all positions of cells."""
     with np.errstate(all="ignore"):
         densities = tensions / cells.lengths
         weights = np.minimum(tensions - low, high - tensions) / cells.lengths
@@ -92,7 +93,7 @@ def _density_change(cells: Cells, densities: np.ndarray, weights: np.ndarray, wr
     operators = (changes * weights[:, None, None]) @ back[:, None]  # T_k
     first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
     second = (operators[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
-    # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero because of rounding.
+    # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero only because of rounding.
     inverse_norm = np.linalg.norm(inverse, axis=(1, 2))
     parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_bound(cells.changes * weights[:, None, None])
     lost = inverse_norm * np.linalg.norm(rows, axis=(1, 2)) * (CELL_ERROR * parts + _length(cells.rounding * weights))
@@ -119,7 +120,7 @@ def _density_change(cells: Cells, densities: np.ndarray, weights: np.ndarray, wr
 
 
 def _over_exits(cells: Cells, effects: np.ndarray) -> np.ndarray:
-    # Largest sums, (n, n_cables), of effects (n, n_cables, n_exits, 3) of exits anywhere within their balls.
+    # Largest sums, (n, n_cables), of effects (n, n_cables, n_exits, 3) of exits within their balls.
     return (_length(effects) * cells.moves[:, None]).sum(2)
 
 
@@ -140,7 +141,7 @@ def _tension_range(
     moved = _over_exits(cells, change.exits)
     spread = weights * (largest_linear(change.linear) + second + moved + change.rest)
     lowest, highest = densities - spread, densities + spread
-    # Expand (L0 - u . dp) f, in which terms of first order may cancel each other.
+    # Expand (L0 - u . dp) f as a whole, since terms of first order may cancel.
     relative = weights * lengths
     linear = relative[..., None] * change.linear - densities[..., None] * cells.steps
     mixed = cells.steps[..., :, None] * change.linear[..., None, :]

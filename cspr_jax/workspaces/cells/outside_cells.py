@@ -1,23 +1,23 @@
 """Cells in which no tensions within limits suffice at any position, from the worst facet normal at the centre; no jax.
 
-Let c be normal to dof - 1 columns S of Z, and move with them: c(x) . Z_S(x) = 0. These cables do nothing along c,
-whatever their tensions, and the wrench is out of reach at x where
+Let c be normal to dof - 1 columns S of Z at all x: c(x) . Z_S(x) = 0. These cables have no effect along c, and the
+wrench cannot be supplied at x if
 
     c(x) . w > sum over the others of the largest of low_j y_j and high_j y_j,    y_j = c(x) . Z_j(x) / L_j(x)
 
-(with high_j = inf: y_j <= 0); and no wrench along -c can be given where all y_j are >= 0. With M = [W_S, c0] and
-M C^-T = Q of orthonormal columns,
+(with high_j = inf: y_j <= 0); and no wrench along -c can be supplied where all y_j are >= 0. With M = [W_S, c0] and
+M C^-T = Q, which has orthonormal columns,
 
     c(x) = Q g(x),    g^T = e^T (I - K)^-1,    K = sum_k x_k K_k,    K_k = Q^T [N_kS / L_S, 0] C^-T,
 
-e the last unit vector, so that with z_j = Q^T Z_j0 and its change a_j = sum_k x_k Q^T N_k e_j
+where e is the last unit vector, so that with z_j = Q^T Z_j0 and its change a_j = sum_k x_k Q^T N_k e_j
 
     c(x) . Z_j(x) = e . z_j + e . v_j + e . K v_j + rest_j,    v_j = K z_j - a_j,
     |rest_j| <= |e^T K| |K| |v_j| / (1 - |K|).
 
 Inverse lengths are L0 / L = 1 + u . dp / L0 + rest, |rest| <= |dp|^2 L0 / (L0 - |dp|)^3, since the second derivatives
-of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, so that Q^T Q is not quite I. Where no cable comes near
-to being normal to c, a fixed c does as well (K = 0); then the products are affine.
+of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, because of which Q^T Q is not exactly I. Where no cable
+is nearly normal to c, a fixed c serves as well (K = 0), and the products are affine.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from cspr_jax.workspaces.cells.cells import (
 
 
 class Products(NamedTuple):
-    """Products of c(x) with the columns of Z(x) over their lengths at the centre, and with the wrench, which is last.
+    """Products of c(x) with the columns of Z(x), over lengths at the centre, and, as the last one, with the wrench.
 
     Fields:
         value: (n, n_cables + 1) products at the centres.
@@ -70,11 +70,11 @@ def are_beyond(
     low: Float[np.ndarray, "n_cables"],
     high: Float[np.ndarray, "n_cables"],
 ) -> Bool[np.ndarray, "n"]:
-    """Tell whether a wrench is beyond what tensions can give at every position of cells."""
+    """Tell whether no tensions can supply a wrench at any position of cells."""
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
         minimum, maximum = (side[:, :-1] for side in products.ends)
-        # The sign at the centre says which limit of each other cable counts; where the sign changes, the slack is less.
+        # The sign at the centre selects the limit of each other cable; where the sign may change, the slack is reduced.
         is_positive = products.value[:, :-1] > 0.0
         is_bounded = np.isfinite(high)
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
@@ -90,7 +90,7 @@ def are_beyond(
 def are_one_sided(
     cells: Cells, normals: Float[np.ndarray, "n m"], held: Int[np.ndarray, "n m-1"] | None
 ) -> Bool[np.ndarray, "n"]:
-    """Tell whether cables fail to resist every wrench at every position of cells."""
+    """Tell whether at every position of cells there is a wrench that cables cannot resist."""
     with np.errstate(all="ignore"):
         products = products_of(cells, normals, held, np.zeros_like(normals))
         minimum = products.ends[0][:, :-1]
@@ -111,7 +111,7 @@ def products_of(
     held: Int[np.ndarray, "n m-1"] | None,
     wrenches: Float[np.ndarray, "n m"],
 ) -> Products:
-    """Products of a normal that moves with the cables S."""
+    """Products of a normal that stays normal to the cables S, or of a fixed one where that suffices."""
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     units = np.concatenate([cells.matrices / cells.lengths[:, None], wrenches[..., None]], axis=2)
     changes = cells.changes / cells.lengths[:, None, None]
@@ -127,7 +127,7 @@ def products_of(
 
 
 def _with_fixed_normal(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
-    # Return the products of a normal c that does not move, which are affine.
+    # Products of a fixed normal c, which are affine.
     value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
     nothing = np.zeros((*value.shape, 3, 3))
     return Products(value, linear.transpose(0, 2, 1), nothing, rounding + CELL_ERROR * np.abs(linear).sum(1))
@@ -136,7 +136,7 @@ def _with_fixed_normal(normals: np.ndarray, units: np.ndarray, changes: np.ndarr
 def _with_moving_normal(
     normals: np.ndarray, held: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray
 ) -> Products:
-    # Return the products of a normal c that moves so that it stays normal to the cables S.
+    # Products of a normal c that turns so that it stays normal to the cables S.
     frame = np.concatenate([np.take_along_axis(units, held[:, None], axis=2), normals[..., None]], axis=2)
     inverse = inverse_factor(frame.transpose(0, 2, 1) @ frame).transpose(0, 2, 1)  # C^-T
     rows = (frame @ inverse).transpose(0, 2, 1)  # Q^T
@@ -166,8 +166,8 @@ def _norms(vectors: np.ndarray) -> np.ndarray:
 
 
 def lower_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n n_cables"]) -> Float[np.ndarray, "n"]:
-    """Lower bounds over cells of the component of a wrench along c, less what some tensions give."""
-    steps = cells.steps / cells.lengths[..., None]  # of L0 / L
+    """Lower bounds over cells of the component along c of a wrench minus the wrench of some tensions."""
+    steps = cells.steps / cells.lengths[..., None]  # terms of first order of L0 / L
     value, linear, quadratic = products.value[:, :-1], products.linear[:, :-1], products.quadratic[:, :-1]
     second = -np.minimum(smallest_quadratic(quadratic), smallest_quadratic(-quadratic))
     middle = products.value[:, -1] - (limits * value).sum(1)

@@ -1,10 +1,10 @@
-"""Bounds of how far cables move and turn while a robot moves within a cell without turning. Arrays in, answers out.
+"""Bounds of movements and rotations of cables while a robot translates within a cell. Arrays in, answers out.
 
-A cable is a segment from its exit E to its attachment point. While the robot moves by at most h, that point does too.
-On its pulley of radius r, E moves along the cable by r / f of the distance that A moves across the cable in the plane
-of the pulley, where f is the free length; and with this plane by at most 2 r / w of the distance that A moves out of
-it, where w is the distance of A from the swivel axis (`robots.model.pulleys`). Wherever A goes, E stays within a range
-of width 4 r and height 2 r.
+A cable is a segment from its exit E to its attachment point A. While the robot moves by at most h, so does A. On a
+pulley of radius r, E moves along the cable by r / f times the distance that A moves across the cable in the plane of
+the pulley, where f is the free length; and together with this plane by at most 2 r / w times the distance that A moves
+out of it, where w is the distance of A from the swivel axis (`robots.model.pulleys`). For all positions of A, E stays
+within a range of width 4 r and height 2 r.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.workspaces.poses import geometry
 
 BATCH = 4096
-# Diagonal of the range within which exits lie, over the radius of the pulley.
+# Diagonal of the range of exits, over the radius of the pulley.
 EXIT_RANGE = math.sqrt(20.0)
 
 
@@ -28,10 +28,10 @@ class Shifts(NamedTuple):
     """Bounds of movements while robots move within their cells.
 
     Fields:
-        robot: (n,) how far the robot moves, m.
-        exits: (n,) how far an exit moves, m; 0 without pulleys.
-        units: (n, n_cables) length of the change of the cable's unit vector.
-        free: (n, n_cables) least free lengths of the cables, m.
+        robot: (n,) largest movement of the robot, m.
+        exits: (n,) largest movement of an exit, m; 0 without pulleys.
+        units: (n, n_cables) norms of the changes of the cables' unit vectors.
+        free: (n, n_cables) smallest free lengths of the cables, m.
     """
 
     robot: np.ndarray
@@ -55,7 +55,7 @@ def shifts(
     radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
     high = (rays * axes).sum(2)
     wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
-    # The distance from the centre of the pulley, which swivels with the cable, changes by no more than the robot moves.
+    # The distance of A from the centre of the pulley, which swivels with the cable, changes by at most the movement.
     out = np.hypot(wide - radius, high) - maximum
     free = np.sqrt(np.maximum(np.square(np.maximum(out, 0.0)) - radius**2, 0.0))
     wide = np.maximum(wide - maximum, 0.0)

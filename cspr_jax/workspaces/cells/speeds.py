@@ -1,6 +1,6 @@
-"""Speeds of cables that velocities of the effector need, for maps of workspaces. Arrays in, answers out.
+"""Speeds of cables that velocities of the effector require, for maps of workspaces. Arrays in, answers out.
 
-A cable of unit vector u, attached at the arm a from the origin of the platform frame, changes its length at the rate
+The length of a cable with unit vector u, attached at the arm a from the origin of the platform frame, has the rate
 -(u.v + (a x u).w), where v is the velocity of the origin and w the angular velocity. Over all v and w with |v| <= V and
 |w| <= W that the robot's pattern allows, the largest rate is |u'| V + |(a x u)'| W, where primes mark the components
 along which the effector can move and about which it can turn: the rows of the wrench matrix.
@@ -27,13 +27,13 @@ BATCH = 4096
 
 @dataclasses.dataclass(frozen=True)
 class CableSpeeds:
-    """Velocities that an effector must be able to have, and largest speeds of its cables.
+    """Required velocities of an effector, and largest speeds of its cables.
 
     Fields:
-        robot: centred, z down, its arms from the origin of the platform frame; see `cable_speeds`.
-        speed: largest speed of the origin, m/s.
-        angular_speed: rad/s.
-        maximum: (n_cables,) largest speeds, m/s.
+        robot: robot in the kernels' axes, with arms from the origin of the platform frame; see `cable_speeds`.
+        speed: required speed of the origin, m/s.
+        angular_speed: required angular speed, rad/s.
+        maximum: (n_cables,) largest speeds of the cables, m/s.
     """
 
     robot: AnyRobot
@@ -44,7 +44,7 @@ class CableSpeeds:
     def margins(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Float[np.ndarray, "n n_cables"]:
-        """Slack up to the largest speeds of the cables."""
+        """Smallest slack of the largest speeds of the cables, at each pose."""
         poses = origins, quaternions
         columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=BATCH)
         forces = len(PATTERNS[self.robot.pattern].forces)
@@ -54,7 +54,7 @@ class CableSpeeds:
     def displaced(
         self, origins: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"], distance: float
     ) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
-        """Margins of robots without pulleys whose spools are displaced so that, to first order, cables are fastest."""
+        """Margins of robots without pulleys, with the displacements of spools that, to first order, are worst."""
         robot = self.robot
         arms, wrenches = cable_wrenches(robot, quaternion, np.ones(robot.dof))
         forces = len(PATTERNS[robot.pattern].forces)
@@ -77,7 +77,7 @@ class CableSpeeds:
 
     def changes(self, moved: Shifts) -> Float[np.ndarray, "n n_cables"]:
         """Largest change of `margins` within cells."""
-        # |u'| is constant for a robot that moves in all directions in which its cables lie.
+        # |u'| is constant for a robot that can move in all directions that its cables can have.
         speed = self.speed if PATTERNS[self.robot.pattern].forces == (2,) else 0.0
         if not isinstance(self.robot, PlatformRobot):
             return moved.units * speed
@@ -86,7 +86,7 @@ class CableSpeeds:
 
 
 def cable_speeds(robot: AnyRobot, maximum: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
-    """Velocities that an effector must be able to have."""
+    """Required velocities of an effector, with its arms taken from the origin of the platform frame."""
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
         robot = dataclasses.replace(robot, platform_points=as_float64(points))

@@ -1,4 +1,4 @@
-"""Cells of maps of workspaces: boxes of positions that lie wholly inside a workspace, or wholly outside of it."""
+"""Proofs that cells of maps, boxes of positions, lie fully inside or outside of a workspace."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.search import WorkspaceAnswers
 
-# Cells that are proved at a time.
+# Number of cells that are proved at a time.
 ROUND = 65536
 
 
 class CellConditions(Protocol):
-    """Conditions on positions, each of which can be proved to hold in whole cells, or one of which to fail."""
+    """Conditions on positions, which can be proved to hold, or to fail, in full cells."""
 
     def at(self, positions: np.ndarray) -> np.ndarray:
         """Sides of positions.
@@ -35,12 +35,12 @@ class CellConditions(Protocol):
 
         Args:
             positions: (n, 3) centres, m.
-            half: (n, 3) half sizes, m.
-            sides: (n,) of the centres.
-            held: (n, n_conditions) conditions that hold in the whole cell already.
+            half: (n, 3) half of the cells' extents, m.
+            sides: (n,) sides of the centres.
+            held: (n, n_conditions) conditions that have been proved in the full cell.
 
         Returns:
-            (n, n_conditions) conditions that hold in the whole cell; (n,) whether one is broken at each position.
+            (n, n_conditions) conditions that hold in the full cell; (n,) whether at each position one fails.
         """
 
 
@@ -48,9 +48,9 @@ class CellSides(NamedTuple):
     """Results of proofs of cells.
 
     Fields:
-        proved: (n,) whether the cell lies wholly on the side of its centre.
-        held: (n, n_conditions) conditions that are proved to hold in the whole cell.
-        mixed: (n,) whether the cell has positions on two sides.
+        proved: (n,) whether the cell lies fully on the side of its centre.
+        held: (n, n_conditions) conditions that are proved to hold in the full cell.
+        mixed: (n,) whether the cell has positions on both sides.
     """
 
     proved: np.ndarray
@@ -66,7 +66,7 @@ def proved_sides(
     held: Bool[np.ndarray, "n n_conditions"],
     depth: int,
 ) -> CellSides:
-    """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows."""
+    """Tell which cells lie fully on the side of their centres; undecided ones are halved up to `depth` times."""
     held, is_broken = conditions.proved(positions, half, sides, held)
     result = CellSides(np.where(sides > 0, held.all(1), is_broken & (sides < 0)), held, np.zeros(len(sides), bool))
     left = np.flatnonzero(~result.proved & (sides != 0))

@@ -1,4 +1,4 @@
-"""The facet normal that decides at a pose: normal to some cables, with the smallest slack along it."""
+"""The facet normal of a pose, normal to dof - 1 cables, along which the slack is smallest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cspr_jax.robots.statics.wrench_sets import normals_to, spanning
 
 # Products of a facet normal with cables count as zero below this fraction of the largest one.
 ZERO = 1e-9
-# A normal to dof - 1 unit columns means nothing if its products with all other columns are smaller than this.
+# A normal to dof - 1 unit columns is dropped if its products with all other columns are smaller than this.
 SHORT = 1e-9
 
 
@@ -25,11 +25,11 @@ class WorstFacets(NamedTuple):
 
     Fields:
         normal: (n, dof) c.
-        subset: (n,) row of `wrench_sets.spanning`: the cables that it is normal to.
-        load: (n,) index of the wrench that needs the most along it.
-        inner: (n, dof) sum of all normals along which the same wrench is out of reach, weighted by how far. Since the
-            most that tensions give along c is a convex function of c, the wrench is out of reach along the sum too, and
-            no cable is normal to it.
+        subset: (n,) row of `wrench_sets.spanning`: the cables to which it is normal.
+        load: (n,) index of the wrench with the smallest slack along it.
+        inner: (n, dof) sum of all normals along which the same wrench cannot be supplied, weighted by the deficit. The
+            largest component that tensions supply along c is a convex function of c, so that the wrench cannot be
+            supplied along the sum either, and no cable is normal to the sum.
     """
 
     normal: Array
@@ -49,10 +49,10 @@ def worst_facets(
     condition: str,
     unbounded: Sequence[bool],
 ) -> WorstFacets:
-    """Facet normals with the least slack, times the volume of the columns that they are normal to.
+    """Facet normals with the smallest slack, where slacks are weighted by the volume of the columns.
 
-    This weight puts normals to nearly dependent columns last, which turn fast with the position. Where a single facet
-    is violated, it is that one; where none is, it is the nearest one.
+    This weight puts normals to nearly dependent columns last, which turn fast with the position. If a single facet is
+    violated, its normal is chosen; if none is, that of the nearest facet.
     """
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)

@@ -11,8 +11,8 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.poses.facet_normals import CableSubsets
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 
-RANK = 1e-9  # singular values over the largest one that count as zero
-NOTHING = 1e-13  # singular values that count as zero: columns are unit vectors
+RANK = 1e-9  # largest singular values, over the largest of all, that count as zero
+NOTHING = 1e-13  # largest singular values that count as zero, since columns are unit vectors
 # Products of a facet normal with cables count as zero below this fraction of the largest one.
 ZERO = 1e-10
 # A wrench lies in the span of the cables if its distance from the span is below this fraction of its length.
@@ -22,7 +22,7 @@ OUTSIDE = 1e-9
 def facet_normals(
     matrix: Float[np.ndarray, "dof n_cables"],
 ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k dof"], Float[np.ndarray, "dof rank"]]:
-    """Facet normals of a wrench matrix, by their products with the cables, and a basis of its span."""
+    """Facet normals of a wrench matrix, given by their products with the cables, and a basis of its span."""
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
     rows = right[:rank]
@@ -46,7 +46,7 @@ class Planes(NamedTuple):
         offsets: (k,) N.
         normals: (k, dof).
         half_range: N; inf without largest tensions.
-        basis: (dof, rank) orthonormal, of the wrenches that the cables span.
+        basis: (dof, rank) orthonormal basis of the wrenches that the cables span.
     """
 
     offsets: np.ndarray
@@ -58,7 +58,7 @@ class Planes(NamedTuple):
 def margin_planes(
     matrix: Float[np.ndarray, "dof n_cables"], low: Float[np.ndarray, "n_cables"], high: Float[np.ndarray, "n_cables"]
 ) -> Planes:
-    """Planes that bound the margin by their distances, in newtons of tension: one for each facet normal and sign."""
+    """Planes whose distances, in newtons of tension, bound the margin: one for each facet normal and sign."""
     components, normals, basis = facet_normals(matrix)
     rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)
@@ -76,7 +76,7 @@ def wrench_margin(
     high: Float[np.ndarray, "n_cables"],
     measure: Float[np.ndarray, "dof"] | None = None,
 ) -> float:
-    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each; or capacity."""
+    """Margin of wrenches: the largest s such that tensions from low + s to high - s give each; or capacity margin."""
     planes = margin_planes(matrix, low, high)
     if any(is_outside(loads, planes.basis) for loads in wrenches.spanning):
         return -np.inf
@@ -100,14 +100,14 @@ def closure_margin(matrix: Float[np.ndarray, "dof n_cables"], choices: CableSubs
     other = components != 0.0
     maximum, minimum = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
     rarer = np.minimum(maximum, -minimum) / np.abs(components).max(1)
-    # A component that is zero here, but not at every pose, may have either sign.
+    # A component that is zero at this pose, but not at every pose, may have either sign.
     always = len(matrix) - 1 + _always_zero(components, choices)
     has_more = (~other).sum(1) > always
     return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
 
 
 def _always_zero(components: np.ndarray, choices: CableSubsets) -> np.ndarray:
-    # Return the number of components, beside those of a hyperplane's columns, that are zero at every pose of the robot.
+    # Number of components, besides those of a hyperplane's columns, that are zero at every pose of the robot.
     if choices.counts is None:
         return np.zeros(len(components), int)
     n_chosen = components.shape[1] - choices.counts.shape[1]

@@ -1,13 +1,14 @@
 """Facet normals of a wrench matrix W, given by their products with the cables.
 
 A facet normal c is normal to dof - 1 columns of W, and y = c . W is a vector of the row space with the fewest non-zero
-components. They decide what cables can do. Tensions at a distance s from all limits give a wrench w, W t = w, if and
-only if for each such y and any tensions t0 with W t0 = w the product y . t0 keeps a distance, which grows with s, from
-the bounds that the limits set (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010).
-Every wrench can be resisted if and only if the rank is full and each y has components of both signs.
+components. These y characterise the wrenches that cables can supply. Tensions at a distance s from all limits give a
+wrench w, W t = w, if and only if for each such y and any tensions t0 with W t0 = w the product y . t0 keeps a distance,
+which grows with s, from the bounds that follow from the limits (hyperplane shifting: Bouchard, Gosselin and Moore 2010;
+Gouttefarde and Krut 2010). Every wrench can be resisted if and only if the rank is full and each y has components of
+both signs.
 
-There are two methods to compute all y: from c; and, with six components and at most eight cables, from the relations
-among the rows of the null space. One lane a pose: all numbers are arrays (...) of one shape.
+All y are computed from c or, with six components and at most eight cables, from the relations among the rows of the
+null space. One lane a pose: all numbers are arrays (...) of one shape.
 """
 
 from __future__ import annotations
@@ -24,22 +25,22 @@ from cspr_jax.numerics.linear.lanes import cross, dot, largest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import spanning
 
-CABLES = 6  # of a base block, in two groups of three
-# Further cables beside a base block.
+CABLES = 6  # number of cables of a base block, in two groups of three
+# Largest number of cables in addition to a base block.
 MAX_OTHERS = 2
-# Columns are unit vectors: a vector that is shorter than this at every pose that was tried is no normal.
+# A product of unit columns that is shorter than this at all tried poses is no normal.
 NOTHING = 1e-12
 
 Column = Sequence[Array]
 
 
 class CableSubsets(NamedTuple):
-    """Choices of dof - 1 cables whose columns have a normal that is not normal to all other columns.
+    """Choices of dof - 1 cables with a facet normal, which is not normal to all other columns.
 
     Fields:
         table: (n_choices, n_cables) the dof - 1 chosen cables, then the others.
-        counts: (n_choices, n_cables - dof + 1) 1 where the component of another cable can differ from zero, else 0;
-            None: all can.
+        counts: (n_choices, n_cables - dof + 1) 1 where the component of another cable can be nonzero, else 0; None: all
+            can.
     """
 
     table: np.ndarray
@@ -47,7 +48,7 @@ class CableSubsets(NamedTuple):
 
 
 def choices_of(matrices: Float[np.ndarray, "n dof n_cables"]) -> CableSubsets:
-    """Choices of dof - 1 cables that have a facet normal at some pose; four cables at one point never do."""
+    """Choices of dof - 1 cables that have a facet normal at some pose; four cables at one point never have one."""
     _check_finite(matrices)
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)
@@ -83,7 +84,7 @@ def normal(columns: Sequence[Column]) -> Column:
 
 
 def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
-    # Return the determinants of all choices of as many rows as columns.
+    # Determinants of all choices of as many rows as there are columns.
     dof = len(columns[0])
     minors: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
     for order, column in enumerate(columns[1:], 2):
@@ -96,7 +97,7 @@ def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
 
 
 def _laplace(head: dict, tail: dict, rows: Sequence[int], sign: int) -> Array:
-    # Return the determinant of some rows by the minors of the first columns and those of the last.
+    # Determinant of some rows from minors of the first and of the last columns.
     terms, signs, order = list[Array](), list[int](), len(next(iter(head)))
     for chosen in itertools.combinations(range(len(rows)), order):
         rest = [index for index in range(len(rows)) if index not in chosen]
@@ -121,7 +122,7 @@ def product(a: Sequence[Array], b: Sequence[Array]) -> Float[Array, "..."]:
 
 
 def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
-    """Relation among rows of the null space, one row more than it has columns: a y that is 0 for all other cables."""
+    """Linear relation among rows of the null space, one more than its columns: a y that is 0 for all other cables."""
     if len(rows) == 2:
         return (rows[1][0], -rows[0][0])
     i, j, k = rows
@@ -133,12 +134,12 @@ def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
 
 
 class Block(NamedTuple):
-    """Tensions of six cables for some wrenches, times a common number.
+    """Tensions of six cables for some wrenches, times a common factor.
 
     Fields:
-        tensions: for each wrench six, in the order of the block.
-        common: factor of all tensions: the cube of a volume times the determinant of the block.
-        scale: size of the numbers whose last digits are the error of the tensions.
+        tensions: six tensions for each wrench, in the order of the block.
+        common: common factor: the cube of a volume times the determinant of the block.
+        scale: magnitude of the numbers whose rounding errors are those of the tensions.
     """
 
     tensions: Sequence[Sequence[Array]]
@@ -147,13 +148,13 @@ class Block(NamedTuple):
 
 
 def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
-    """Tensions of six cables by adjugates, the cables in two groups of three; no division."""
+    """Tensions of six cables in two groups of three, by adjugates, without divisions."""
     a, c = [column[:3] for column in columns[:3]], [column[3:] for column in columns[:3]]
     adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
     volume = dot(a[0], adjugate[0])
 
     def reduced(six):
-        # Return the tensions of three cables that cancel the force, times the volume, and the remaining moment.
+        # Tensions of three cables that cancel the force, times the volume, and the remaining moment.
         tensions_for_force = [dot(row, six[:3]) for row in adjugate]
         left = tuple(volume * six[3 + i] - sum(c[j][i] * tensions_for_force[j] for j in range(3)) for i in range(3))
         return tensions_for_force, left
@@ -170,13 +171,13 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
             for j in range(3)
         ]
         tensions.append([*first, *(volume * x for x in last)])
-    # All tensions are products of two remaining moments and of factors not above 1.
+    # All tensions are products of two remaining moments and of factors of at most 1.
     maximum = largest([jnp.abs(x) for left in lefts for x in left])
     return Block(tensions, volume * determinant, maximum * maximum)
 
 
 def base_order(matrices: Float[np.ndarray, "n 6 n_cables"]) -> tuple[int, ...]:
-    """Order of the cables in space such that the first six, and the first three forces, are far from singular."""
+    """Order of the cables in which the first six, and the forces of the first three, are far from singular."""
     _check_finite(matrices)
     count = matrices.shape[2]
 

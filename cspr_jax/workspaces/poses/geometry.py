@@ -1,6 +1,6 @@
 """Geometry of many poses: unit vectors of the cables, columns of the wrench matrix, weights.
 
-Arrays are (n_cables, n): a row a cable, a lane a pose. Turned arms, unit vectors, columns and all that follows are
+Arrays are (n_cables, n): one row a cable, one lane a pose. Rotated arms, unit vectors, columns and later steps are
 compiled separately: in one call XLA would compute each length three times, and loops over values that the call itself
 has stored are three times as slow as loops over its arguments.
 """
@@ -28,7 +28,7 @@ from cspr_jax.robots.model.state import State
 def wrench_columns(
     robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Float[Array, ""]
 ) -> tuple[list[Array], Array]:
-    """Columns of the wrench matrix, and how much larger their errors are than rounding."""
+    """Columns of the wrench matrix, and their errors in units of rounding."""
     arms = None if quaternion is None else turned_arms(robot, quaternion)
     units, loss = unit_vectors(robot, position, arms)
     if isinstance(robot, PlatformRobot):
@@ -55,12 +55,12 @@ def _down(points: Array, shape: tuple[int, int]) -> Vector:
 
 
 def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Array]:
-    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables."""
+    """Unit vectors of the cables, from the effector to the spools; with pulleys, along the free cables."""
     return _units(robot, position, arms, _inverse_lengths(robot, position, arms))
 
 
 def _rays(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Vector]:
-    # Return the attachment points of the cables, and the rays from there to the base points.
+    # Attachment points of the cables, and rays from there to the base points.
     shape = robot.n_cables, len(position[0])
     if arms is None and isinstance(robot, PlatformRobot):
         arms = _down(robot.platform_points, shape)
@@ -107,7 +107,7 @@ def _columns(
 
 
 def scales(robot: AnyRobot) -> Bool[np.ndarray, "dof"]:
-    """Mask of the components of a wrench that are moments."""
+    """Mask of those components of a wrench that are moments."""
     row = PATTERNS[robot.pattern]
     return np.arange(robot.dof) >= len(row.forces)
 
@@ -139,7 +139,7 @@ def exit_points(
 def cable_lengths(
     robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
 ) -> Float[Array, "n n_cables"]:
-    """Lengths of the cables, from the points where they enter their pulleys, or from the base points."""
+    """Lengths of the cables from their base points, including the arcs on pulleys."""
     targets, pulleys = attachments(robot, positions, quaternions), robot.pulleys
     if pulleys is None:
         return jnp.linalg.norm(robot.base_points[None] - targets, axis=2)
@@ -151,7 +151,7 @@ def cable_lengths(
 def attachments(
     robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
 ) -> Float[Array, "n n_cables 3"]:
-    """Points at which the cables are attached."""
+    """Attachment points of the cables at poses."""
     arms = jnp.zeros((len(positions), *robot.base_points.shape), positions.dtype)
     if isinstance(robot, PlatformRobot):
         points = robot.platform_points
@@ -161,14 +161,14 @@ def attachments(
 
 @jax.jit
 def weights(robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]) -> Float[Array, "n dof"]:
-    """Wrenches that hold a robot still."""
+    """Wrenches that hold a robot at rest."""
     return jax.vmap(lambda p, q: robot.inertial_wrench(at_rest(p, q)))(positions, quaternions)
 
 
 def mass_centres(
     robot: AnyRobot, origins: Float[np.ndarray, "n 3"], quaternions: np.ndarray | None
 ) -> Float[np.ndarray, "n 3"]:
-    """Positions of the mass centre, or of the joint of a robot that has one, as the kernels take them."""
+    """Positions of the mass centre, or of the joint of a robot on a joint, as the kernels take them."""
     row = PATTERNS[robot.pattern]
     if not isinstance(robot, PlatformRobot) or row.is_jointed or robot.centre_of_mass is None:
         return origins

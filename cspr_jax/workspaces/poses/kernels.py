@@ -1,7 +1,7 @@
 """Compiled margins of many poses: loops over the facet normals of a robot, one lane a pose.
 
-The body of a loop is compiled once, whatever the number of cables. Its result is one complex number, the lower bound of
-the margin and the upper one: with two results XLA would compute everything twice.
+The body of a loop is compiled once for any number of cables. Its result is one complex number, with the lower and the
+upper bound of the margin as its parts: with two results XLA would compute everything twice.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cspr_jax.workspaces.poses.facet_normals import (
 )
 from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, FacetLimits, Wrenches, length, one_norm
 
-# Up to so many facet normals the loop is unrolled.
+# Up to this number of facet normals the loop is unrolled.
 UNROLLED = 10
 
 
@@ -40,7 +40,7 @@ class TensionLimits(NamedTuple):
     Fields:
         low: (n_cables,) smallest tensions, N.
         high: (n_cables,) largest tensions, inf for none, N.
-        measure: (dof,) factors of the components of a normal before its length divides a capacity margin.
+        measure: (dof,) factors of the components of a normal in the length by which a capacity margin is divided.
     """
 
     low: Array
@@ -59,7 +59,7 @@ def by_normals(
     measure: str,
     is_bounded: bool,
 ) -> Shaped[Array, "..."]:
-    """Margins of poses of any robot, by the normals to dof - 1 cables."""
+    """Margins of poses of any robot, from the normals to dof - 1 cables."""
     dof, template = len(components), components[0][0]
     lanes = wrenches._replace(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
@@ -93,13 +93,13 @@ def _facet_limits(
     entries: Sequence[Array], low, high, counts, divisor: Array, noise: Array, error: Array
 ) -> FacetLimits:
     noises = [noise] * len(entries)
-    if counts is not None:  # components that are zero at every pose have no rounding
+    if counts is not None:  # components that are zero at every pose have no rounding error
         entries, noises = ([x * counts[i] for i, x in enumerate(values)] for values in (entries, noises))
     return FacetLimits(entries, list(low), list(high), divisor, noises, error)
 
 
 def _wrench_bound(wrenches: Wrenches) -> Array:
-    # Return an upper bound of the norm of a wrench.
+    # Upper bound of the norm of a wrench.
     parts = [one_norm(point) for point in wrenches.points]
     spreads = [jnp.sum(axes) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
     return sum(spreads, largest(parts))
@@ -112,7 +112,7 @@ def _row(array: Array, k: Array) -> Array:
 def _smallest_margin(
     facet, table: np.ndarray, limits, template: Array, tension_limits: TensionLimits, *, measure: str, is_bounded: bool
 ) -> Array:
-    # Return the least margin of all facet normals.
+    # Smallest margin of all facet normals.
     margin_of = margins.bounded_margin if is_bounded else margins.free_margin
 
     def step(bounds, each):
@@ -125,7 +125,7 @@ def _smallest_margin(
         return lax.complex(*minimum), None
 
     largest_one = jnp.inf * jnp.ones_like(template)
-    if measure == "tensions":  # no margin is larger than half the range of a cable
+    if measure == "tensions":  # margins are at most half of a cable's range
         largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(tension_limits.high - tension_limits.low))
     count = len(table)
     start = lax.complex(largest_one, largest_one)
@@ -133,11 +133,11 @@ def _smallest_margin(
 
 
 class NullSpace(NamedTuple):
-    """Tensions of six cables and up to two more, of many poses; the cables in the order of the block.
+    """Tensions of six to eight cables at many poses, with the cables in the order of the block.
 
     Fields:
-        rows: for each cable beyond the first six (n_cables, n): how tensions change with its tension, times a common
-            number.
+        rows: for each cable beyond the first six, derivatives (n_cables, n) of tensions with respect to its tension,
+            times a common factor.
         held: (n_cables, n) tensions that supply the wrench, N; 0 beyond the first six.
         noise: (n,) error of the product of a facet normal with a cable.
         loss: (n,) error of the held tensions, N.
@@ -154,7 +154,7 @@ class NullSpace(NamedTuple):
 def null_space(
     components: Sequence[Array], loss: Float[Array, "n"], wrench: Column, *, order: tuple[int, ...]
 ) -> NullSpace:
-    """Tensions without a wrench, and tensions that supply one, of robots on six to eight cables in space."""
+    """Tensions that give no wrench, and tensions that supply the wrench, of spatial robots on six to eight cables."""
     return _joined(_by_block(components, wrench, order=order), wrench, loss)
 
 
@@ -162,8 +162,8 @@ def null_space(
 def _by_block(
     components: Sequence[Array], wrench: Column, *, order: tuple[int, ...]
 ) -> tuple[list[list[Array]], Array]:
-    # Return the tensions of the first six cables for each cable beyond them and for the wrench, in pairs as complex
-    # numbers, which halves what XLA computes again for each result; and their common factor, with the scale of errors.
+    # Tensions of the first six cables for each further cable and for the wrench, in pairs as complex numbers, since XLA
+    # repeats computations for each result; and their common factor, with the scale of errors.
     template = components[0][0]
     cables = [[component[k] for component in components] for k in order]
     load = [jnp.broadcast_to(x, template.shape) for x in wrench]
@@ -195,7 +195,7 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
 def by_null_space(
     space: NullSpace, tension_limits: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
 ) -> Shaped[Array, "..."]:
-    """Margins of poses by the relations among rows of the null space."""
+    """Margins of poses from the relations among rows of the null space."""
     template = space.loss
     finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     tension_bound = jnp.sum(finite) + space.largest

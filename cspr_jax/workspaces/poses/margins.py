@@ -1,6 +1,6 @@
-"""Margins of poses, one facet normal after the other, between two bounds that allow for rounding.
+"""Bounds of margins of poses, which allow for rounding, one facet normal after the other.
 
-Where the bounds lie apart, `workspaces.poses.exact` answers the pose by singular values.
+Where both bounds differ too much, `workspaces.poses.exact` computes the margin by singular values.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from cspr_jax.numerics.linear.lanes import largest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.workspaces.poses.facet_normals import Column, product
 
-# Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
-# cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.
+# Errors, in units of rounding, of a product of unit columns, and of the numbers of a block of six cables. They are
+# estimates, not proofs; in all tests margins by singular values lie between the bounds.
 EPSILONS = 64.0
 BLOCK_EPSILONS = 8.0
 
@@ -25,7 +25,7 @@ class Wrenches(NamedTuple):
     """Wrenches that cables must supply: all sums of a wrench of a finite set, one of a box and one of each ellipsoid.
 
     Fields:
-        points: the finite set, dof components each, () or one a pose, moments over a length, N.
+        points: the finite set, dof components each, for all poses () or one for each, moments over a length, N.
         box: (dof,) half widths of a box about zero, N; None: there is none.
         ellipsoids: (dof,) semi-axes of each ellipsoid about zero, N.
     """
@@ -36,16 +36,16 @@ class Wrenches(NamedTuple):
 
 
 class FacetLimits(NamedTuple):
-    """A facet normal, by its products with the cables, and the limits of these cables.
+    """A facet normal, given by its products with the cables, and the limits of these cables.
 
     Fields:
-        entries: components that need not be zero, of any common length.
+        entries: components that can be nonzero, up to a common factor.
         low: smallest tensions of these cables, () each, N.
         high: largest tensions, () each, N; inf where there is none.
-        divisor: of the margin: the sum of the absolute components for tensions, the length of the normal for the
-            capacity margin.
+        divisor: divisor of the margin: the sum of the absolute components for tensions, the length of the normal for
+            the capacity margin.
         noises: errors of the components.
-        error: of the difference between tensions and wrenches along the facet normal, in units of the divisor times N.
+        error: error of the difference between tensions and wrenches along the facet normal, N times the divisor.
     """
 
     entries: Sequence[Array]
@@ -94,7 +94,7 @@ def bounded_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bound
 
 
 def _between(facet: FacetLimits, sure: Array, possible: Array) -> Bounds:
-    # Divide by a divisor that has an error as well.
+    # The divisor has an error as well.
     inverse = 1.0 / facet.divisor
     lower, upper, loss = sure * inverse, possible * inverse, sum(facet.noises[1:], facet.noises[0])
     less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
@@ -104,7 +104,7 @@ def _between(facet: FacetLimits, sure: Array, possible: Array) -> Bounds:
 def free_margin(facet: FacetLimits, support: Array, opposite: Array) -> Bounds:
     """Bounds of the margin of one facet normal; any of its cables may have no largest tension.
 
-    A component that may be zero but for rounding frees the upper bound, but not the lower one.
+    A component that may be zero except for rounding makes the upper bound infinite, but not the lower one.
     """
     lower, upper = list[Array](), list[Array]()
     for sign, demand in ((1.0, support), (-1.0, opposite)):
