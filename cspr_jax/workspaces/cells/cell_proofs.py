@@ -130,8 +130,8 @@ class CellProofs:
         self, positions: np.ndarray, exits: np.ndarray, normals: np.ndarray, held: np.ndarray, loads: np.ndarray
     ) -> np.ndarray:
         # Displacements of spools, (n, n_cables, 3) m, with which, to first order, tensions supply the smallest wrench
-        # along given normals. Cables that act along a normal are at their limits; the others have the tensions that then
-        # come nearest to the wrench.
+        # along given normals. Cables that act along a normal are at their limits; the others have tensions that come
+        # nearest to the wrench.
         matrices, units = self._matrices(positions, exits), unit_vectors(exits - positions[:, None])
         effects = np.einsum("nm,kmi->nik", normals, self._forces)
         products = (effects * units).sum(2)
