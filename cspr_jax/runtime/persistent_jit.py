@@ -72,7 +72,7 @@ def persistent_jit(
         if PROGRAMS in os.environ and not jax.config.jax_disable_jit:  # type: ignore[attr-defined]
             with contextlib.suppress(*_TROUBLE):
                 return programs.result(arguments, keywords)
-        # Errors of arguments come from jax.
+        # Let jax report errors of arguments.
         return compiled(*arguments, **keywords)
 
     call.lower = compiled.lower  # type: ignore[attr-defined]

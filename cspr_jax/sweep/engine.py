@@ -79,7 +79,7 @@ class Run:
 
     Args:
         directory: folder of the run, which is made if it is absent.
-        options: options of the run.
+        options: whether environments may differ, shards are kept, and which tiles are computed.
         hooks: hooks by which it reports progress, and learns whether to stop.
     """
 

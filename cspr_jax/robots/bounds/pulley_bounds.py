@@ -1,8 +1,8 @@
 """Bounds of cables behind pulleys, over a block of time: direction, length, and what swivelling adds to accelerations.
 
 Formulas are those of `robots.model.pulleys` and `robots.statics.cable_lengths`, in affine bounds. With phi the angle of
-the wrapped arc and phi_c its value in the middle of the bounds, the sine of phi - phi_c is linear in the direction; it
-stays within a right angle as long as this sine cannot reach 1, since the angle changes continuously.
+the wrapped arc and phi_c its value in the middle of the bounds, the sine of phi - phi_c is linear in the direction.
+Since phi changes continuously, phi - phi_c stays within a right angle as long as this sine cannot reach 1.
 """
 
 from typing import NamedTuple

@@ -18,7 +18,7 @@ from cspr_jax.robots.model.platform import RIGID, PlatformRobot
 from cspr_jax.robots.model.shapes import Box, Cylinder, Hull, is_flat
 
 # Lengths over the extent of a scene:
-DEEPEST = 1e-4  # depth from which on penetrations are not distinguished
+DEEPEST = 1e-4  # deeper penetrations are not distinguished
 THINNEST = 1e-9  # thickness given to flat boxes
 
 
@@ -53,7 +53,7 @@ class Bodies(NamedTuple):
         leave: () length of each cable next to its attachment point that may touch the platform, m.
         sectors: (n_cables, 2, 3) sides and (3,) normal of `interference.Contacts`; None: not checked.
         extent: () largest coordinate, m.
-        deepest: () depth from which on penetrations are not distinguished, m.
+        deepest: () deeper penetrations are not distinguished, m.
     """
 
     pairs: Any

@@ -60,7 +60,7 @@ class Robot(Protocol):
 
         Returns:
             (dof, n_cables), one column a cable: the force; for a platform, below it, the moment about its mass centre
-            or joint, m; of both only the components that the pattern balances.
+            or joint, m; only components that the pattern balances.
         """
 
     def inertial_wrench(self, state: State) -> Array:

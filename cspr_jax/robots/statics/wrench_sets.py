@@ -27,8 +27,8 @@ from cspr_jax.robots.model.state import State
 
 # Columns are unit vectors: d - 1 with a volume below this span no face; a column this near to a plane lies in it.
 FLAT = 1e-12
-# Rounding error of a slack, over the magnitude of the numbers whose difference it is, times the volume of the face's
-# columns.
+# Rounding error of a slack, relative to the numbers that are subtracted; divided by the volume of the face's columns,
+# it bounds the error.
 SLACK_ERROR = 1e-14
 
 
@@ -39,13 +39,13 @@ class Faces:
 
     Fields:
         normals: (..., n_faces, n_components) unit normals that point inside; 0 for a candidate that is no face.
-        offsets: (..., n_faces) products of the normals with points of the faces, N or m/s^2; -inf for no face.
+        offsets: (..., n_faces) products of the normals with points of the faces, N or m/s^2; -inf likewise.
         volumes: (..., n_faces) volume of the unit columns that span the face, in [0, 1].
         apex: (..., n_components) wrench, or acceleration, at the smallest tensions.
         of_largest: (..., n_faces) whether a cable is at its largest tension on the face.
         is_regular: (...) whether the set has an inside: the cables span all d components.
-        closure: (...) margin of wrench closure, in [-1, 1], positive if large enough tensions resist every wrench: the
-            largest component of a column beyond a plane of d - 1 unit columns, minimum over both sides of all planes.
+        closure: (...) margin of wrench closure, in [-1, 1], positive if large enough tensions resist every wrench. Each
+            side of each plane of d - 1 unit columns has a largest distance of a column; this is the smallest of these.
     """
 
     normals: Array
@@ -138,7 +138,7 @@ def one_sided_faces(
         norm = jnp.linalg.norm(normals, axis=1)[:, None]
         along = jnp.take_along_axis(normals / jnp.where(norm > FLAT, norm, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
         return jnp.where((norm > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
-    # The other cables' rows of the kernel number one more than its columns: the products are their linear relation.
+    # The products are the coefficients of the linear relation among the kernel's rows for the other cables.
     rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
         return jnp.ones(chosen.shape)

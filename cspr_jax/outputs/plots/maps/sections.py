@@ -37,7 +37,7 @@ from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
-# Azimuth and tilt of an orientation: a polar plane.
+# Axes of orientations that are drawn in polar coordinates.
 POLAR = ("tilt_azimuth", "tilt")
 # Axes of a view from above, drawn in its true shape.
 AROUND = ("azimuth", "radius")
@@ -132,7 +132,7 @@ def section_figure(
 
 
 def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
-    # Choose sections evenly, but replace those nearest to sections with marks by the latter.
+    # Choose sections evenly. If a section with marks is not among them, show it in place of the one nearest to it.
     indices = shown.tolist()
     for index in marked_indices:
         if index not in indices:
