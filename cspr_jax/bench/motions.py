@@ -64,7 +64,7 @@ def _motion(region: Region, rng: np.random.Generator) -> Spline:
 
 
 def _decided(proofs: list[MotionProof]) -> None:
-    # Refuse motions that are not decided, since their proofs stop early.
+    # Refuse undecided motions: only decided ones count.
     if any(not proof.is_feasible and not proof.broken.any() for proof in proofs):
         raise SelfCheckError("a motion of the bench is neither proved nor refuted")
 

@@ -77,7 +77,7 @@ class GridMap(abc.ABC):
         """Cells whose numbers contradict each other, which only a broken processor, driver or compiler can cause."""
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
-        """Number of cells without a proof of either feasibility or infeasibility; None for maps that prove nothing."""
+        """Number of cells whose answer is not proved, feasible or not; None for maps that prove nothing."""
         return int(((answers["verdict"] & NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:
@@ -210,6 +210,6 @@ class PointMassMap(GridMap):
 
 
 def exceeds(bound: Float[np.ndarray, "n"], margin: Float[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
-    """Tell where a bound exceeds its margin by more than rounding; the margin is -inf if the cables cannot balance."""
+    """Tell where a bound exceeds its margin by more than rounding; the margin is -inf if cables span too little."""
     with np.errstate(invalid="ignore"):
         return bound > margin + CHECK_ERROR * (1.0 + np.abs(margin))

@@ -84,7 +84,7 @@ class PlannedMotions:
 
     @property
     def is_at_origin(self) -> bool:
-        """Tell whether files hold poses of the platform's own axes; a plan for joints then moves their origin."""
+        """Tell if files hold poses of the platform's axes, not of its mass centre; joints are at their origin."""
         row = PATTERNS[self.robot_file.own_pattern]
         return self.point == "origin" and row.is_body and not row.is_jointed
 

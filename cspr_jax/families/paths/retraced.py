@@ -32,7 +32,7 @@ BRIEF = 4e-6  # s; shorter pieces are not halved, since rounding affects their s
 PIECES, FEWEST = 48, 4  # number of pieces of a section at first, and smallest number in each smooth part
 # The direction at a stop is extrapolated from samples at these fractions of a smooth part, with these weights.
 BESIDE, WEIGHTS = 1e-3 * np.arange(1.0, 5.0), np.array([4.0, -6.0, 4.0, -1.0])
-# Near a stop the acceleration counts as constant if speed and acceleration times time differ by less than this.
+# Near a stop the acceleration counts as constant if speed over time differs from it by a smaller fraction.
 UNEVEN = 0.1
 # Fractions of the time of each piece that divide it, for quadrature, and for comparing the curve with the motion.
 QUARTERS = np.linspace(0.0, 1.0, 5)
