@@ -20,8 +20,10 @@ MEDIAN = 0.6745
 # Standard deviation of the second derivative of a cubic spline through white noise of unit variance at unit steps.
 BENDING = 6.0
 GRAVITY = 9.81
-ACCELERATION = 0.02  # noise may cause accelerations up to this fraction of gravity and of the motion's largest one
-JUMP_FRACTION = 0.01  # smallest fraction of the samples at which noise makes the acceleration jump by more
+# Noise is reported if its accelerations exceed this fraction of gravity, or of the motion's own largest acceleration
+# where that is larger, and the acceleration jumps by more than that at the given fraction of the samples.
+ACCELERATION = 0.02
+JUMP_FRACTION = 0.01
 # Samples that scatter by more than this fraction of the range of positions are waypoints, unless their time steps are
 # at most CLOSE, s.
 SCATTER, CLOSE = 0.05, 0.02

@@ -1,4 +1,4 @@
-"""Kinds of motions of platforms, known when a function is compiled."""
+"""Kinds of motions of platforms, which are static in compiled functions."""
 
 from typing import NamedTuple
 

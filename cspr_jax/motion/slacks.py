@@ -1,4 +1,4 @@
-"""Slacks of any motion: numbers that are positive exactly while a criterion is met, from the state at one time.
+"""Slacks of any motion: functions of its state at one time that are positive exactly while a criterion is met.
 
 They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. With n
 the number of cables and kappa_k the tension of cable k over its length, their order is:

@@ -21,7 +21,7 @@ from cspr_jax.sweep.tile import compute_tile
 from cspr_jax.sweep.work import Computed
 
 SECONDS_TO_CONNECT = 20
-# Times, s, after which a scheduler is given up: it cannot be reached, its machine refuses connections, or it was lost.
+# Times, s, after which a scheduler is given up that cannot be reached, that refuses connections, or that was lost.
 SECONDS_TO_REACH, SECONDS_FOR_REFUSAL, SECONDS_LOST = 3.5, 1.0, 3.0
 # Workers may wait in a cluster's queue: times, s, after which the user is told, and after which the run gives up.
 SECONDS_FOR_WORKERS = (5, 900)
