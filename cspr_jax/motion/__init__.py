@@ -8,7 +8,7 @@ Files, each importing only from those above it:
     motion              the protocol: duration, state, breaks; motions reversed and placed
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
     swing_plane         the plane in which an effector swings between two points
-    platform_kind       kinds of motions of platforms, known when a function is compiled
+    platform_kind       kinds of motions of platforms, static in compiled functions
     limits              which limits are set, the quantities that they bound, and their slacks
     given_limits        limits of a file or a caller, checked
     problem             robot, limits and amplitude function

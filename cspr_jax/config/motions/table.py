@@ -17,7 +17,7 @@ Z_AXES = ("down", "up")
 # Points of a platform whose positions a motion may have.
 POINTS = ("mass-centre", "origin")
 FAR = 30.0  # motions that go beyond this multiple of the robot's size are probably in other units
-# If this many rows or more have integer times, these are probably milliseconds, or numbers of rows.
+# Integer times of more rows than this are probably milliseconds, or have no unit.
 MANY = 50
 
 

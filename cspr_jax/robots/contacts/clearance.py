@@ -92,7 +92,7 @@ class Clearances(NamedTuple):
         nearest: (n,) index in `Scene.contact_pairs` of the two nearest bodies; -1 where nothing can meet.
         cables: (n,) the smallest clearance of two cables, m; inf where none can meet.
         obstacles: (n,) the smallest clearance of obstacles from cables and platform, m.
-        platform: (n,) smallest clearance of cables from their own platform, m; at most `Scene.leave`.
+        platform: (n,) smallest clearance of cables from their own platform, m; at most `leave` for longer cables.
         is_open: (n,) whether the smallest clearance is within rounding of the threshold.
     """
 

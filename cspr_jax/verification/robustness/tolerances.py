@@ -32,7 +32,7 @@ OPEN = 256  # largest number of open blocks per arc
 DECIDED = 4.0
 LOWERED = 0.95  # factor by which a target is lowered if more blocks are open
 LOWERINGS = 8  # largest number of times in a row that a target is lowered
-# Number of further halvings in search of a robot that fails, after bounds are found that cannot hold.
+# Level of halving up to which a robot that fails is searched for although the bounds cannot hold.
 MORE = 3
 
 

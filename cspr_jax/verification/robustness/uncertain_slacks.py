@@ -36,7 +36,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import limit_slacks, tension_slacks
 
 STEP = 1e-6  # displacement for finite differences, over the length of a cable
-NEAREST = 2  # number of criteria, those with the smallest slacks, for which worst displacements are computed
+NEAREST = 2  # number of criteria, those that would fail first, for which worst displacements are computed
 BATCH = 256  # number of robots in single states of a batch
 
 
