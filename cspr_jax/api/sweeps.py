@@ -1,4 +1,4 @@
-"""Sweeps from Python: run into a directory as by `cspr run`, or computed in memory; inspection of runs and results."""
+"""Sweeps from Python: run into a directory as by `cspr run`, or without keeping files; inspection of results."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def open_result(path: str | Path) -> Result:
         the result.
 
     Raises:
-        StoreError: the file is missing, not HDF5, damaged, or not written by this program; or the run in the directory
-            has not finished.
+        StoreError: the file is missing, neither HDF5 nor CSV, damaged, or not written by this program; or the run in
+            the directory has not finished.
     """
     cell = Path(path)
     result = _open_result(inspection.result_in(cell) if cell.is_dir() else cell)
@@ -134,7 +134,7 @@ class Job:
         Raises:
             CsprError: as for `run`.
         """
-        with _executor(self, prepare) as executor:  # errors here are single lines, so print hints after it
+        with _executor(self, prepare) as executor:  # hints come later, so that a refusal here stands alone
             robot = self.sweep.robot
             from cspr_jax.config.hints import robot_hints, sweep_hints  # loads the keys of plans, which is slow
 
@@ -190,8 +190,8 @@ def run(
         given: path of a sweep file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
             lists). Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
         directory: run directory; None: results/<sweep>-<first 12 digits of its identity>.
-        workers: number of processes on this machine; above 1, a script must call this function under
-            `if __name__ == "__main__":`.
+        workers: number of processes on this machine; None: the usual number for its kind of map. Above 1, a script must
+            call this function under `if __name__ == "__main__":`.
         scheduler: address of a dask.distributed scheduler whose workers compute instead.
         prune: whether to remove the files of tiles once the result is complete.
         accept_environment_change: whether to resume even if version, machine or libraries have changed.
@@ -315,7 +315,8 @@ def workspace_volume(result: ResultOrPath) -> WorkspaceVolume:
         result: result of a map with verdicts: its file, or what `open_result` or `compute_sweep` returns.
 
     Returns:
-        the volume; its arrays run over the axes that are not coordinates of positions, or are () without such axes.
+        the volume; its arrays run over the axes that are not coordinates of positions, and have shape () if there are
+            none.
 
     Raises:
         InputError: the result is not a map, has no stored verdicts, or has a single position.

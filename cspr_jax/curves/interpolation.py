@@ -73,7 +73,7 @@ def linear_maps(times: Float[np.ndarray, "n"], kind: str, ends: str, n_arrays: i
 
 
 def continuous(quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
-    """Unit quaternions, each of the sign that is nearer to the one before."""
+    """Unit quaternions, each with the sign that brings it nearer to the one before."""
     units = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     flips = np.where(np.sum(units[1:] * units[:-1], axis=1) < 0.0, -1.0, 1.0)
     return units * np.cumprod(np.append(1.0, flips))[:, None]

@@ -60,7 +60,7 @@ class Amplitude:
         return derivatives(self, jnp.asarray(tau, float), order=order)[order]
 
 
-# The name is not part of the pytree: a function of another name is not compiled again.
+# The name is not part of the pytree, so that functions with different names share compiled code.
 _FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
 jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
 
@@ -130,13 +130,13 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
     """One of the amplitude functions of the thesis.
 
     "A1", "quintic" (also "A2"), "A3": thesis (1.101) and (2.50). "effective": (1.110), a cubic-like
-    start, a straight middle and the mirrored end. "effective-c3": the same shape with
-    A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump. "ideal": (1.103), A = tau,
-    which meets no boundary condition and serves for bounds.
+    start, a straight middle, and the start rotated by 180 degrees as end. "effective-c3": the same shape with
+    A'' = k tau (epsilon - tau)^2 at the start, so that A''' does not jump inside. "ideal": (1.103), A = tau, with
+    A' = 1 at both ends, which serves for bounds.
 
     Args:
         name: one of `NAMES`.
-        epsilon: length of the curved ends of the last two, from 0.001 to 0.5.
+        epsilon: length of the curved ends of "effective" and "effective-c3", from 0.001 to 0.5.
 
     Returns:
         the amplitude function.
@@ -187,7 +187,7 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
 
 
 def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
-    """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends."""
+    """Broken conditions of thesis (2.49): A(0) = 0, A(1) = 1, A' and A'' zero at both ends, except A''(1) at a free end."""
     first, last = np.asarray(amplitude.coefficients)[[0, -1]]
     errors = []
     for tau, coefficients, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):

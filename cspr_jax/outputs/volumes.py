@@ -112,7 +112,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
     def placed(name: str) -> np.ndarray:
         values = result.data[name].transpose(*others, *order)
-        # An axis with only one point has one cell.
+        # The other axes of position have only one point.
         singles = tuple(i for i, k in enumerate(others) if names[k] in axes)
         return values.squeeze(axis=singles)
 
@@ -143,7 +143,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
 
 def _widths(points: np.ndarray, name: str) -> np.ndarray:
-    # Widths of the parts of an axis that its points represent.
+    # Widths of the parts of an axis that its points represent; those of radii are multiplied by the radius.
     order = np.argsort(points)
     gaps = np.diff(points[order])
     widths = np.empty(len(points))

@@ -81,7 +81,7 @@ _PUBLISHED_2_1 = {
     "6": ("0.5425", "6", "7.85"),
 }
 
-# In most tables p is the number of arcs; here it is the S-model's time of acceleration.
+# In most tables p is the number of arcs; in those with these heads it is the S-model's time of acceleration.
 ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
     "1.1": TableSource(
@@ -209,7 +209,7 @@ def _plain(cell: Cell) -> dict[str, Any]:
 
 
 def _variant(text: str) -> dict[str, str]:
-    # Format "key = value; key = value"; other readings are plain words.
+    # Several choices read "key = value; key = value"; any other text is one reading, in plain words.
     if "; " not in text:
         return {"reading": text}
     return dict(part.split(" = ", 1) for part in text.split("; "))

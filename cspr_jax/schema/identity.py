@@ -25,7 +25,7 @@ def identity(settings: dict[str, Any]) -> str:
 
 
 def differences(current: dict[str, Any], other: dict[str, Any]) -> list[str]:
-    """Differences between two sets of settings, one phrase a key."""
+    """Differences between two sets of settings, one phrase for each key."""
     values, before = _flat(current), _flat(other)
     return [
         f"{key} = {shown(values.get(key))} here, {shown(before.get(key))} there"

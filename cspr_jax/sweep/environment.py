@@ -44,7 +44,7 @@ def package_hash() -> str:
     """SHA-256 of the package's own files, which needs no git and includes uncommitted changes."""
     total = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*")):
-        # Leave out examples, which only wheels contain and nothing is computed with.
+        # Leave out examples, which only wheels contain, and which compute nothing.
         if path.suffix in (".py", ".toml") and PACKAGE / "examples" not in path.parents:
             total.update(f"{path.relative_to(PACKAGE).as_posix()}\0".encode())
             total.update(hashlib.sha256(path.read_bytes()).digest())

@@ -45,7 +45,7 @@ class Part:
         data: quantities over the full grid.
         present: mask of the finished cells, in the shape of the grid.
         shards: shards of finished tiles, by index, without their values; a result has none.
-        says_proved: whether it has the number of cells that are proved.
+        says_proved: whether it tells how many of its cells are proved.
     """
 
     path: Path
@@ -114,8 +114,8 @@ class Merged:
         parts: two or more parts.
         accept_environment_change: whether parts may come from different environments.
 
-        Fields:
-            sweep: sweep of the joined map.
+    Fields:
+        sweep: sweep of the joined map.
 
     Raises:
         RefusedError: parts do not fit together, with a line for each reason; or cells are missing.

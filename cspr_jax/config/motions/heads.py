@@ -1,6 +1,7 @@
 """Heads of the columns of a table: their names and units, in the forms in which people and programs write them.
 
-A unit follows the name in brackets or parentheses, `x [mm]`, or after a slash or an underscore, `x/mm` and `t_ms`.
+A unit follows the name in brackets or parentheses, `x [mm]`, or after a slash, an underscore, a dot, a space or "in",
+`x/mm`, `t_ms` and `x in mm`.
 """
 
 import re
@@ -13,7 +14,7 @@ from cspr_jax.schema.quantities import columns_of
 LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0}
 TIMES = {"s": 1.0, "ms": 0.001, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 ANGLES = {"rad": 1.0, "deg": np.pi / 180.0, "°": np.pi / 180.0, "mrad": 0.001}
-# Kinds of columns: units of length or angle, and the power of time that divides these.
+# Kinds of columns: their units, and the power of a unit of time that divides these.
 KINDS = {
     "time": (TIMES, 0),
     "length": (LENGTHS, 0),
@@ -73,7 +74,7 @@ NO_UNIT = ("", "-", "1")
 _HEAD = re.compile(r"^([^\[\]()]*?)\s*(?:\[([^\[\]]*)\]|\((.*)\))?$", re.DOTALL)
 _BEHIND = re.compile(r"^(.+?)(?:\s*/\s*|\s+in\s+|\s+|[_.])([a-zµμ°]+)$")
 LONGEST_HEAD = 200  # letters
-# Words in the names that other programs use; a group is read only if all of its columns are found.
+# Words in the names that other programs use; a group is read only if all of its columns are found, or x and z alone.
 _TIME_WORDS = {"timestamp", "stamp", "time", "zeit", "temps", "tiempo", "tempo", "elapsed"}
 _POSITION_WORDS = {"p", "pos", "position", "translation", "coordinate", "coord", "koordinate", "location"}
 _QUATERNION_WORDS = {"q", "quat", "quaternion", "orientation"}
@@ -139,7 +140,7 @@ def mentioned(text: str) -> list[str]:
 
 
 def units_within(text: str) -> list[str]:
-    """Units among the words of a comment, except the default ones."""
+    """Units among the words of a comment, except default ones, and "min" and "us", which are words too."""
     words = re.findall(r"(?<![\w/])(?:[^\W\d_]+|°)(?![\w/])", text.lower())
     units = [unit_of(word) for word in words if word not in ("min", "us")]
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]

@@ -2,9 +2,9 @@
 
 With the ratio r = p / T the S-model has s = r S(x) and s'' = A(x) / (r T^2) while it accelerates, x from 0 to 1, with
 A = 8 x and S = 4/3 x^3 up to the middle. It meets a bound s'' <= b + m s if 1 / T^2 <= min of r (b + m r S) / A over x,
-which has a closed form; braking is the same, seen from the end, with 1 - r. The first expression grows with r and the
-second falls, so 1 / T^2 is largest where they are equal. For all laws, no motion is faster than accelerating at the
-bound and then braking at it.
+which has a closed form; braking is the same, seen from the end, with 1 - r. Unless bounds fall steeply, the first
+expression grows with r and the second falls, so 1 / T^2 is largest where they are equal. For all laws, no motion is
+faster than accelerating at the bound and then braking at it.
 """
 
 from __future__ import annotations

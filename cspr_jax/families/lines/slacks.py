@@ -1,8 +1,8 @@
 """Slacks of taut cables and of limits along a straight line, as functions of s, s'^2 and s''.
 
-On the line a cable has length l = sqrt(|D|^2 (s - c)^2 + h^2), rate |D|^2 (s - c) / l times s', and a second derivative
-with h^2 / l^3. Every slack here is affine in s'^2 and s'', so for one law it is affine in 1 / T^2. The formulas are
-written once: a search evaluates them on arrays, a proof on interval jets.
+On the line a cable has length l = sqrt(|D|^2 (s - c)^2 + h^2), rate |D|^2 (s - c) / l s', and second derivative
+|D|^2 h^2 / l^3 s'^2 + |D|^2 (s - c) / l s''. Every slack here is affine in s'^2 and s'', so for one law it is affine in
+1 / T^2. The formulas are written once: a search evaluates them on arrays, a proof on interval jets.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class LineSlacks:
         spans: (n_faces,) whether the cables of the face span it.
         low: smallest tensions over the mass, by group of faces, (n_cables,) m/s^2 each.
         high: largest tensions over the mass, by group of faces; inf for none.
-        largest: limits on the motion of the effector, by name; (n_cables,) for cables, else (1,).
+        largest: limits on speeds and accelerations, by name; (n_cables,) for those of cables, else (1,).
     """
 
     square: Array

@@ -120,7 +120,7 @@ def settled(
 def _confirmed(
     checker: MotionChecker, segments: PlatformSegment, smallest: FewestArcs
 ) -> tuple[FewestArcs, np.ndarray]:
-    # A number of arcs is undecided if a proof leaves its motion open, or refutes it only between samples; name it.
+    # If a proof leaves a motion open, or refutes it only between samples, report its number of arcs as undecided.
     passed = np.flatnonzero(smallest.arcs > 0)
     if len(passed):
         part = checker.confirmed(take_segments(segments, passed), smallest.arcs[passed], smallest.checks.take(passed))
@@ -155,7 +155,7 @@ def _reasons(
     named = np.zeros(len(basic), int)
     for flag, column in zip(checker.flags, broken.T, strict=True):
         named |= np.where(column, flag.value, 0)
-    # Some of these motions are proved but for limits, or for the planned robot alone.
+    # Motions that limits refuse may also be undecided, or proved for the planned robot alone: keep these flags.
     alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
     return np.where(by_limits, alone, basic | named)
 

@@ -27,7 +27,7 @@ def from_tilt_torsion(angles: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "
 
 
 def cylindrical_frames(positions: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
-    """Azimuths (3.98) of the cylindrical frames of positions, to be added to tilt-and-torsion angles in them."""
+    """Azimuths (3.98) of the cylindrical frames of positions: add them to tilt-and-torsion angles in these frames."""
     azimuth = np.arctan2(positions[..., 1], positions[..., 0])
     return np.stack([azimuth, np.zeros_like(azimuth), np.zeros_like(azimuth)], axis=-1)
 

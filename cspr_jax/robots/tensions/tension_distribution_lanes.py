@@ -1,6 +1,6 @@
-"""Tensions of least norm within limits, one lane a pose: the fast form of `tension_distribution.least_norm`.
+"""Tensions of least norm within limits, one lane for each pose: a fast form of `tension_distribution.least_norm`.
 
-It serves robots with one or two redundant cables. All tensions are t0 + N^T x, by Gram and Schmidt with each row
+It serves robots with one or two redundant cables. All tensions are t0 + N^T x, by Gram and Schmidt, with each row
 orthogonalised twice. The shortest feasible x is 0, or lies on the line where one cable is at a limit, as near to 0 as
 the other cables allow: on each line they leave an interval, whose point nearest to 0 is either the point of the line
 nearest to 0 or an end of the interval.
@@ -29,8 +29,8 @@ Lanes = Sequence[Array]
 FREE = (1, 2)
 # Number of poses of a batch on a CPU, so that some hundred arrays fit into a cache.
 BATCH = 4096
-# The slow form decides if, of the components of rows of a wrench matrix normal to the other rows, the shortest is less
-# than this fraction of the longest.
+# The slow form decides if rows of a wrench matrix are nearly dependent: each has a component normal to the rows before
+# it, and the shortest of these components is not above this fraction of the longest.
 UNCERTAIN = 1e-5
 
 
@@ -209,7 +209,7 @@ def least_norms(
     low: Float[np.ndarray, "n n_cables"],
     high: Float[np.ndarray, "n n_cables"],
 ) -> tuple[Distribution, np.ndarray]:
-    """Tensions of least norm within limits, of many poses."""
+    """Tensions of least norm within limits, of many poses, and a mask of poses that the slow form must decide."""
 
     def one(part: slice):
         arrays = tuple(x[part] for x in (matrices, wrenches, low, high))

@@ -59,13 +59,13 @@ class TimeBlocks(NamedTuple):
     def cut(
         self, first: Float[np.ndarray, "k"], last: Float[np.ndarray, "k"], jumps: Complex[np.ndarray, "n"]
     ) -> "tuple[TimeBlocks, TimeBlocks]":
-        """Cut each block around its undecided part, or into two, at a jump of the acceleration if there is one."""
+        """Cut each block around its undecided part, or halve it; a jump of acceleration splits what is undecided."""
         width = self.end - self.start
         before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
         is_cut = (last - first < SMALL) & (before < after)
         outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
         outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
-        # Do not cut around parts of blocks with a jump inside, whose bounds are wide everywhere.
+        # Split at a jump what is left, since no bounds across a jump come close to the slacks on both of its sides.
         start, end = np.where(is_cut, before, self.start), np.where(is_cut, after, self.end)
         middle, has_jump = _jump_within(jumps, self.motion, start, end)
         middle = np.where(has_jump, middle, 0.5 * (start + end))

@@ -37,7 +37,7 @@ class Distances(NamedTuple):
     middle_spools: np.ndarray
 
     def hold(self, spools: Float[np.ndarray, "k"]) -> Bool[np.ndarray, "k"]:
-        """Prove that all distances stay positive within blocks, for all displacements of the spools."""
+        """Tell whether all distances are proved positive within blocks, for all displacements of the spools."""
         far = spools[:, None]
         cosine = np.sqrt(np.maximum(1.0 - (far * self.sine) ** 2, 0.0))
         low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
@@ -74,7 +74,7 @@ class Enclosure(NamedTuple):
         moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
         acceleration_matrix: (k, 3, 3) matrix from a point of the platform, relative to the mass centre, to its relative
             acceleration, 1/s^2.
-        tangent: (k, n_cables, 3) change of the tangents of the rays from the middle to the end of the block, m.
+        tangent: (k, n_cables, 3) change of the rays along their tangents from the middle to the end of the block, m.
         deviation: (k, n_cables) largest distance of the rays from their tangents within the block, m.
         force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
         acceleration_matrix_change: (k,) largest change of `acceleration_matrix` likewise, 1/s^2.

@@ -181,8 +181,8 @@ def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, rate:
 
 @persistent_jit(compiler_options=compile_options.proof_options())
 def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
-    # Return for each cell the positive and the negative part of its contribution to the bound, the weight that its
-    # multipliers lack, and by how much y . a' - y' . a is negative.
+    # Return for each cell what it adds to the bound, what it takes from the bound, the weight that its multipliers
+    # lack, and by how much y . a' - y' . a is negative.
     def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array, Array]:
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)

@@ -22,7 +22,7 @@ from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.runtime.stages import within
 
 ROUNDS = 8  # largest number of rounds of proof and tightening
-SHORTER = 4  # number of times that ramps are halved if no motion with them exists
+SHORTER = 4  # number of ramp times tried, each half of the one before, until a motion with them exists
 # A slow motion has this speed over that of a fall along the path.
 SLOW = 0.01
 FINER = (2, 4)  # factors of finer grids, for motions without a proof or without a close lower bound

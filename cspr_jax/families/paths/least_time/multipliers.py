@@ -2,8 +2,8 @@
 
 With multipliers that are linear between nodes, the bound of `families.paths.least_time.duality` is the dual of a
 problem in which x = s'^2 is constant in each cell. Half-planes hold at the nodes, where u is the difference of x in the
-adjacent cells over the cells' widths, and x is their mean. The only unknowns are x of the cells, so an interior-point
-method needs only a tridiagonal matrix.
+adjacent cells over the sum of their widths, and x is their mean weighted by the widths. The only unknowns are x of the
+cells, so an interior-point method needs only a tridiagonal matrix.
 """
 
 from __future__ import annotations

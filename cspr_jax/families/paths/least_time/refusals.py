@@ -40,7 +40,7 @@ def half_plane_names(
 
 def _of_faces(problem: Problem, state: State, coefficients: np.ndarray) -> list[HalfPlaneName]:
     # With as many cables as degrees of freedom, all cables but one span a face. The half-plane of this face limits the
-    # tension of that cable: from below if it has the opposite sign, else from above.
+    # tension of that cable: from below if the tension falls as the half-plane's left side grows, else from above.
     robot = problem.robot
     count = face_count(robot)
     if robot.n_cables > robot.dof:
@@ -56,7 +56,7 @@ def _of_faces(problem: Problem, state: State, coefficients: np.ndarray) -> list[
     ]
 
 
-# Name for the path speeds from which the rest of the path can be run along, which are no half-plane of a point.
+# Name of a bound that no half-plane at the point sets: the path speeds from which the end can be reached.
 REST_OF_PATH = None
 
 

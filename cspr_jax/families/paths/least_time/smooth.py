@@ -25,7 +25,7 @@ SMALLEST = 1e-12  # smallest x of the start, over the largest x
 NEAREST, SLOWER = 6, 0.8
 FLAT = 1e-12  # a half-plane with a smaller coefficient of u bounds x alone
 MISSED = 1e-9  # other half-planes may be broken by this much
-MORE_ROWS = 4  # number of times that broken half-planes are added
+MORE_ROWS = 4  # number of times that half-planes are added: those nearest to a motion that breaks some
 
 
 class SectionEnds(NamedTuple):

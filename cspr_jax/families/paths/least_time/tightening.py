@@ -20,7 +20,7 @@ from cspr_jax.verification.criteria import Criterion, criteria
 from cspr_jax.verification.piece_slacks import Sides, close_bounds
 from cspr_jax.verification.proved_answers import TENSIONS
 
-LEFT = 1e-7  # a criterion counts as met if its slack over its scale is above this
+LEFT = 1e-7  # slack over its scale that larger margins are to leave
 MORE, STEP = 1.3, 1e-5  # margins grow by this multiple of the missing slack plus this
 BINDING = 0.01  # a criterion binds if its slack over its scale is below this
 # After the first round, margins also grow in the nearest n_cells / SPREAD cells on each side.

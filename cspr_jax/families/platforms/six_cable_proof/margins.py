@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Bool, Float, Int
 
-ROUNDS = 5  # number of parabolas, each within the previous one
+ROUNDS = 5  # number of parabolas, each about the lowest point of the previous one
 NEARER = 3.0  # ratio of the point distances of one parabola and the next
 LEVEL = 1e-9  # values with a smaller spread are not refined
 

@@ -31,7 +31,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 CHUNK = 8  # number of samples in one call
 FIRST = 2  # number of motions screened at a time over the number checked at a time
-FEWER = 8  # up to a batch over this number of motions count as few
+FEWER = 8  # motions count as few if they are at most a batch divided by this
 
 
 @persistent_jit(static_argnames=("kind", "single_precision"))

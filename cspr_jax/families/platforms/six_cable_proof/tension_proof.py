@@ -206,7 +206,7 @@ def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
 
 def _orders(problem: Problem) -> list[_Order]:
     # The robot's own order comes first, then the orders whose first, third and fifth ray span the largest volumes at
-    # rest, at unit depth below the spools.
+    # rest, as far below the spools as their largest coordinate.
     robot = problem.robot
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     rays = arms + np.array([0.0, 0.0, float(np.abs(base).max())]) - base

@@ -1,4 +1,4 @@
-"""Work list of a proof: blocks of motions are halved until each is proved, or until its motion is refuted."""
+"""Work list of a proof: blocks are halved until each is proved, or until its motion is refuted or given up."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def film(
 
 
 def _named_by_content(page: bytes) -> bytes:
-    # matplotlib names parts of a page at random: replace these names, so that the same film has the same bytes.
+    # matplotlib names parts of a page at random: the same film must have the same bytes, two films different names.
     match = RANDOM.search(page)
     if match is None:
         return page

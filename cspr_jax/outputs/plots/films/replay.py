@@ -59,7 +59,7 @@ def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
 
 
 def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) -> None:
-    # Draw the largest value of each window, since deviations are noise of rounding, which would fill the panel.
+    # Draw the largest value of each window, since rounding is noise, which would fill the panel.
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]
     drawn = {name: _largest(deviations, starts) for name, deviations in values.items()}
