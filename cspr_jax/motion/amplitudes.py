@@ -187,7 +187,7 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
 
 
 def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
-    """Broken conditions of thesis (2.49): A(0) = 0, A(1) = 1, A' and A'' zero at both ends, except A''(1) at a free end."""
+    """Broken conditions of thesis (2.49): A(0) = 0, A(1) = 1, A' = A'' = 0 at both ends; A''(1) = 0 if not free."""
     first, last = np.asarray(amplitude.coefficients)[[0, -1]]
     errors = []
     for tau, coefficients, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):

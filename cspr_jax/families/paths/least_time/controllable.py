@@ -67,7 +67,8 @@ class GridSolution(NamedTuple):
         high: (n_cells + 1, n_paths) largest such x.
         x: (n_cells + 1, n_paths) squared path speeds, 1/s^2 times the unit of s^2.
         u: (n_cells, n_paths) path accelerations in the middle of the cells.
-        empty: (n_paths,) index of the last cell without a controllable x; -1 if all cells have one.
+        empty: (n_paths,) index of the last cell without a controllable x; -1 if all cells have one; n_cells if x at the
+            end is above its cap.
         is_start: (n_paths,) whether the start is controllable.
     """
 

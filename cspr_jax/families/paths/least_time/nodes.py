@@ -25,7 +25,7 @@ RAMP = 0.25  # cells become wider over this fraction of the nodes, from an end a
 SMALLER = 5  # number of even narrower cells at such an end
 BATCH, MANY = 64, 512  # number of points computed at a time, for one section and for many
 DEGREE = 5  # degree to which all pieces are raised, so that all sections share compiled programs
-# A node counts as the end of a piece if its distance from it is below this fraction of the piece.
+# A node counts as the end of a piece if its distance from it is below this fraction of the shortest piece.
 NEAR = 1e-9
 
 

@@ -12,7 +12,7 @@ from cspr_jax.outputs.plots.style.fitting import legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS, line_style
 from cspr_jax.outputs.table_layout import two_digits
 
-# A path is planar if its extent across is below this fraction of its length: typed numbers are rounded.
+# A path is planar if its extent along y is at most this fraction of that along x: typed numbers are rounded.
 ONE_PLANE = 1e-9
 BOUNDARIES = 200  # largest number of segments whose boundaries are drawn: more lines would hide the rest
 RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
