@@ -187,7 +187,10 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
 
 
 def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
-    """Broken conditions of thesis (2.49): A(0) = 0, A(1) = 1, A' = A'' = 0 at both ends; A''(1) = 0 if not free."""
+    """The conditions of thesis (2.49) that a function breaks.
+
+    A(0) = 0, A(1) = 1, and A' and A'' are zero at both ends; at a free end A''(1) may have any value.
+    """
     first, last = np.asarray(amplitude.coefficients)[[0, -1]]
     errors = []
     for tau, coefficients, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):

@@ -175,7 +175,7 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 
 
 def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
-    """Result of an earlier run with the same sources, libraries and settings; if there is none, compute and keep it.
+    """Result of an earlier run with the same sources, libraries and settings; if none, or `again`, compute and keep it.
 
     Results are kept beside compiled code, under a checksum: damaged ones are removed before they are read.
     """
