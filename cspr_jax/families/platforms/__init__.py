@@ -4,8 +4,7 @@ Position and orientation oscillate together, so that the cables of a robot that 
 its platform moves to poses far from it. Tensions, determinant, limits on the pose and contacts are proved on blocks of
 time: they are analytic functions of complex time, so the error of polynomials through their values at Chebyshev nodes
 can be bounded. On more than six cables, searches rely on samples; the motion that they choose is then proved by
-    tensions
-that balance it throughout blocks.
+tensions that balance it throughout blocks.
 
 Source: Dion-Gauvin's thesis, chapter 3 (sections 3.7 to 3.13: oscillating SLERP, beta-hat, accessible and attainable
 orientations).

@@ -36,7 +36,7 @@ class PlatformMotionAnswers(Answers):
     Fields:
         beta_hat: (n, 2) beta-hat at both ends.
         det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, which have no
-            determinant, and whose contacts with the platform are not checked.
+            determinant, and whose contacts with the platform are not sampled.
         cable_distance: (n,) smallest distance between cables that can touch, m.
         refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
             contacts; NaN if it is not refuted, or by contacts that were only sampled.
@@ -141,7 +141,7 @@ def _reasons(
     max_arcs: int,
     fixed: np.ndarray | None,
 ) -> np.ndarray:
-    # Return the flags of the criteria that refuse a number of arcs.
+    # Return the flags of the criteria that leave motions without a number of arcs.
     limits = sum({flag.value for flag in itertools.compress(checker.flags, checker.is_limit)})
     basic = checks.verdict & ~(limits & ~Verdict.SLACK_CABLE.value)
     by_limits = refused.arcs > 0

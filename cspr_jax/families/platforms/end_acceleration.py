@@ -21,7 +21,7 @@ from cspr_jax.robots.statics.wrench_balance import jacobian
 
 # At rest in the reference orientation beta-hat is arbitrary; this value is that of a pendulum.
 AT_REST = -1.0
-# Tensions with a relative change below this count as independent of beta-hat.
+# Tensions whose derivative in beta-hat is below this fraction of the mean tension count as independent of it.
 FLAT = 1e-12
 
 

@@ -27,7 +27,7 @@ class Swings(NamedTuple):
 
     Fields:
         center: the point p0, m.
-        end_offset: vector from p0 to the end in the direction of the first arc, m.
+        end_offset: vector in the direction of the first arc, as long as the distance of the end from p0, m.
         axis: unit vector of the rotation.
         angle: (n,) full angle of the envelope, in half turns.
         start_beta_hat: (n,) beta-hat in p0.

@@ -37,11 +37,12 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.verification.fewest_limits import Refused
 
-# The third derivative of the amplitude function counts as jumping at a knot if it changes by this relative amount.
+# The third derivative of the amplitude function jumps at a knot if it changes by more than this fraction of its largest
+# value.
 JUMP = 1e-6
 NEAR_KNOT = 1e-12  # distance from a knot at which both sides are compared
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# Cost, in arcs, of a motion that only limits refuse: more than any sequence of feasible motions costs.
+# Arcs added to those of a motion that only limits refuse: more than any sequence of feasible motions has.
 REFUSED = 100_000
 # For up to this many segments, compiling for large batches takes longer than it saves.
 FEW_SEGMENTS = 1000
@@ -240,7 +241,7 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
 
 
 def _is_determined(problem: Problem) -> bool:
-    # Tell whether the motion determines the tensions: then the determinant of a reference pose is a scale.
+    # Tell whether the motion determines the tensions, and the determinant of a reference pose tells what is singular.
     return problem.robot.n_cables == problem.robot.dof
 
 

@@ -37,9 +37,9 @@ class PlatformChecks:
             proof, as on more than six cables before `MotionChecker.confirmed`.
         refuted_tau: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (to within a
             small step); NaN if it is not refuted, or by contacts that were only sampled.
-        tolerated: (n,) multiple of the uncertainty that the motion is proved to tolerate; for verdicts alone, at most
-            1; NaN without an uncertainty, or if the motion is not feasible as planned.
-        not_tolerated: (n,) multiple that the motion does not tolerate; infinite if none was found.
+        tolerated: (n,) multiple of the uncertainty that the motion is proved to tolerate; for verdicts alone, 1 or 0;
+            NaN without an uncertainty, or if the motion is not feasible as planned.
+        not_tolerated: (n,) multiple that the motion does not tolerate; infinite if none was found; NaN likewise.
     """
 
     verdict: np.ndarray

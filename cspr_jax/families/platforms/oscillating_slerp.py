@@ -20,8 +20,8 @@ from cspr_jax.numerics.elementary import length, polynomial, sincospi
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.shapes import Bool, Float, Num
 
-# Series replace quotients that lose digits by cancellation: of arccos(s) / sqrt(1 - s^2) if 1 - s is below `_NEAR`,
-# with this many terms, and of sin(r) / r if r^2 is small.
+# Series replace quotients that lose digits by cancellation: of arccos(s) / sqrt(1 - s^2) if 1 - s is below `_NEAR`, and
+# of sin(r) / r if r^2 is below `_SMALL`.
 _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 3))])]
 _SMALL, _SERIES = 0.5, 12

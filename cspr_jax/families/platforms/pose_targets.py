@@ -29,7 +29,7 @@ def rest_poses(z0: Float[np.ndarray, "n"]) -> Poses:
 
 
 def start_beta_hat(checker: MotionChecker, starts: Poses, z0: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Beta-hat at starts: the preferred one, of (3.91) or of the largest margin; if there is none, that at rest."""
+    """Beta-hat at starts other than P0: that of (3.91) or of the largest margin; if there is none, that at rest."""
     # There are few different starts: compute the options once for each.
     distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
     values = checker.end_options(distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]

@@ -12,7 +12,7 @@ from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, joined, no
 from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
-# Bound of the rounding error of derivatives by recurrences, over the larger of their magnitude and 1.
+# Bound of the rounding error of derivatives by recurrences, over their magnitude (`angle_ratio`) or over 1 (`sinc`).
 DERIVATIVE_ERROR = 1e-12
 # Largest second derivatives in y = r^2 of cos r, of sin r / r, and of the first two derivatives of sin r / r. The n-th
 # derivative of sin r / r is (-1/2)^n j_n(r) / r^n, with the spherical Bessel function j_n; its magnitude is largest at

@@ -2,8 +2,8 @@
 
 The effector swings like a pendulum that hangs from the centroid of the spools, with the natural frequency
 sqrt(gravity / z0), while its amplitude grows or shrinks along an amplitude function A. So the acceleration is
-proportional to the displacement from the equilibrium P0 = (0, 0, z0) and opposite to it, up to terms that vanish with
-the number of arcs, and every cable stays taut far beyond the footprint of the spools. A motion is feasible if the
+proportional to the displacement from the equilibrium P0 = (0, 0, z0) and opposite to it, up to terms that vanish as the
+number of arcs grows, and every cable stays taut far beyond the footprint of the spools. A motion is feasible if the
 pseudotensions of all cables, (2.12) to (2.14), and the depth below the spools stay positive; bounds of their second
 derivatives make proofs of samples.
 

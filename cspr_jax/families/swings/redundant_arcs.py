@@ -1,10 +1,10 @@
-"""Smallest numbers of arcs of point masses on more cables than degrees of freedom: samples first, then a proof.
+"""Smallest numbers of arcs of swings of point masses on redundant cables: samples first, then a proof.
 
 The motion is that for three cables. With lambda = gravity / z0, the acceleration of a pendulum -lambda (p - P0) needs a
 force from p towards the centroid of the spools. The centroid lies between the spools, so below them tensions can supply
-the force; all other terms vanish with the number of arcs. Candidates are tried in increasing order; each is refuted by
-samples, or proved over its full time (`verification.proved_answers`). Margins are distances of all tensions from their
-limits, over the weight per cable.
+the force; all other terms vanish as the number of arcs grows. Candidates are tried in increasing order; each is refuted
+by samples, or proved over its full time (`verification.proved_answers`). Margins are distances of all tensions from
+their limits, over the weight per cable.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ def _measured(problem: Problem, *, segments: Segment, tried: np.ndarray, rows: n
 
 
 class _Trials:
-    # Trials of numbers of arcs: proved margins of those that are not refuted, and the one with the largest sampled
-    # slack among those that are.
+    # Trials of numbers of arcs: proved margins of those that samples do not refute, and for each segment the tried
+    # number with the largest sampled slack.
 
     def __init__(self, problem: Problem, parities: dict[int, Segment], count: int) -> None:
         self._problem, self._parities = problem, parities

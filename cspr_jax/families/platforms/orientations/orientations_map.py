@@ -32,7 +32,7 @@ class OrientationWorkspaceMap(PlatformMap):
         """Find the robot's symmetries."""
         super().__init__(robot_file, spec, file)
         self._orientations = spec.orientations or Orientations()
-        # Limits that differ from cable to cable break symmetries.
+        # Limits may differ from cable to cable, which breaks symmetries.
         self._alike = NONE if limits_set(self._problem.limits) else symmetries(self._problem.robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -46,7 +46,7 @@ class OrientationWorkspaceMap(PlatformMap):
         return {name: values[inverse.ravel()] for name, values in answers.items()}
 
     def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # Return z0, if not given, that of horizontal transitions. Accessible orientations do not depend on it.
+        # Return z0; if it is not given, that of horizontal transitions. Accessible orientations do not depend on it.
         depth = self._targets(cells)[:, 2]
         return np.asarray(cells.get("z0", depth), float)
 

@@ -43,7 +43,7 @@ SAMPLES = 32
 # A search refines minima between samples if the smallest sample is below this fraction of the largest.
 NEAR = 0.1
 HALVINGS = 60  # bisections of an interval of beta-hat, down to rounding
-FLAT = 1e-12  # derivatives over margins count as zero below this
+FLAT = 1e-12  # derivatives of distances from planes count as zero below this fraction of the weight per cable
 # Empty interval.
 NONE = (LARGEST, -LARGEST)
 

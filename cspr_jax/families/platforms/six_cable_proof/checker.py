@@ -261,7 +261,8 @@ class PlatformChecker(MotionChecker):
 
 
 def _missed(problem: Problem, limit_row: Limit) -> float:
-    # Return the slack below which a limit counts as broken; a depth is over z0, at least a tenth of the spool radius.
+    # Return how far below zero a slack must be to break a limit; depths are over z0, at least a tenth of the spool
+    # radius.
     robot, limit = problem.robot, float(np.min(getattr(problem.limits, limit_row.name)))
     units = scales(CABLES, robot.mass * robot.gravity, 0.1 * spool_radius(robot))
     factor, unit = units.get(limit_row.quantity, (1.0, limit))

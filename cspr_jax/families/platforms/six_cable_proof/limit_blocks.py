@@ -33,7 +33,7 @@ class Node(NamedTuple):
 
     Fields:
         state: state of the platform.
-        cables: vectors of the cables.
+        cables: arms and rays of the cables.
         kappa: numerators of the slacks of taut cables, (n,) each; see `tension_blocks`.
         squared: T^2, s^2.
         z0: depth of P0, m.

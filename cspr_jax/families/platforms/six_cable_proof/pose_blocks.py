@@ -1,4 +1,4 @@
-"""Bounds on blocks of contacts, of the depth, and of limits on the pose, which depend on a platform's pose alone.
+"""Bounds of contacts, depth and limits on the pose over blocks of motions; these depend on a platform's pose alone.
 
 Two cables do not touch if some unit vector e has e . (x_j - x_i) > 0 for all points x of both; as this is linear in the
 points, the ends of the cables are enough. A cable does not touch the platform if its vector v from its corner, in

@@ -19,7 +19,7 @@ from cspr_jax.verification.bounds.blocks import Blocks
 LIMITS_UNDECIDED = 1e-12
 HALVINGS = 21  # largest number of halvings of a block
 OPEN = 64  # largest number of open blocks of an arc
-# Factor of `OPEN` for motions that break no criterion by more than the undecided range.
+# Factor of `OPEN` for blocks proved to break no criterion by more than the tolerance of criteria that are no limits.
 TOUCHING = 64
 # Number of times that blocks are halved at once: in the first, in the second, and in all later rounds. In later rounds
 # few blocks are open, and a batch of them costs as much as a full one.

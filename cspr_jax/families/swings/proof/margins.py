@@ -207,5 +207,5 @@ def each_margin(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"])
     table = blocks(problem.amplitude, int(np.max(arcs)))
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)
-    # A compiled minimum may ignore NaN: a function that is not finite everywhere has no minimum.
+    # A compiled minimum may ignore NaN; if it is not finite, the function has no minimum.
     return np.where(np.isfinite(smallest), smallest, np.nan)
