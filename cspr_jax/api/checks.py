@@ -125,7 +125,7 @@ class Check(Displayed):
 
     @property
     def demands(self) -> dict[str, dict[str, Any]]:
-        """Peak value for each limit, with proved bound, allowed value, cable and time."""
+        """Worst value for each limit or condition, with proved bound, allowed value, cable and time."""
         return self._object["demands"]
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Sweeps from Python: run into a directory as by `cspr run`, or without keeping files; inspection of results."""
+"""Sweeps from Python: run into a directory as by `cspr run`, or keeping no files; inspection of runs and results."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
 class SamplePoses(NamedTuple):
-    """Random poses below the spools, as lanes.
+    """Random poses among the spools, as lanes.
 
     Fields:
         position: three arrays (n,), position of the mass centre, m.

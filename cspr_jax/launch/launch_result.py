@@ -33,7 +33,7 @@ class LaunchResult(LegResult):
         landing: (3,) where the flight ends, m.
         flight_time: time of flight, s.
         tension_min: smallest tension on the segment, N.
-        throw: the release and its motions, from which errors start.
+        throw: the release and its motions, to compute the scatter under errors.
         robot: centred robot, z down.
         frame: frame of the robot file.
         scatter: scatter of the landings, if the plan names errors.
@@ -87,7 +87,7 @@ class LaunchResult(LegResult):
         return lines
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Flight of the object and landings of a sample of throws; see `LegResult.columns`."""
+        """Flight of the object and landings of a sample of throws, none without a launch; see `LegResult.columns`."""
         if not math.isfinite(self.flight_time):
             return {}
         t = np.linspace(0.0, self.flight_time, FLIGHT_ROWS)

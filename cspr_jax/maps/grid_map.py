@@ -77,7 +77,7 @@ class GridMap(abc.ABC):
         """Cells whose numbers contradict each other, which only a broken processor, driver or compiler can cause."""
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
-        """Number of cells whose answer is not proved, feasible or not; None for maps that prove nothing."""
+        """Number of cells whose motion, smallest number of arcs or infeasibility is not proved; None without proofs."""
         return int(((answers["verdict"] & NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:

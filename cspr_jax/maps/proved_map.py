@@ -38,7 +38,7 @@ class ProvedMap(GridMap):
     from_rest: ClassVar[bool] = False
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
-        """Refuse robots that no path can move, and starts without a position."""
+        """Refuse robots that cannot follow a path, and starts without a position."""
         super().__init__(robot_file, spec, file)
         check_start(robot_file, spec, file, rests=self.from_rest)
         if robot_file.own_pattern == "1T" or PATTERNS[robot_file.own_pattern].is_jointed:

@@ -117,7 +117,7 @@ class PlannedMotions:
 
     @cached_property
     def tension_margin(self) -> np.ndarray:
-        """Smallest distance of tensions from their limits, (n,) N: from proofs where there are any, else at samples."""
+        """Smallest distance of tensions from their limits, (n,) N: from proofs, else by a search between samples."""
         margins = self.demands.tension_margin.copy()
         for i, proof in enumerate(self.answers.proof):
             if proof is not None and not proof.contacts_alone:

@@ -29,7 +29,7 @@ SMALLEST_GAIN = 1e-4
 # A motion with a path speed above this fraction of the largest one searched counts as not bounded by any limit.
 UNBOUNDED = 0.5
 AWAY = 1e-6  # m; if the motion is farther from the planned path, its grid is doubled
-DOUBLINGS = 3  # largest number of doublings
+DOUBLINGS = 3  # largest number of grids tried, the first one included
 # Accelerations at a pose may jump by this fraction of gravity without a warning.
 JUMPS = 1e-6
 

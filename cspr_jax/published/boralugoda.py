@@ -122,7 +122,7 @@ def table_4_3() -> dict[Key, float | None]:
 
 
 def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    # Return by how much s'' exceeds its upper boundary for each T and p, and from time p on its lower one.
+    # Return by how much at most s'' exceeds its upper boundary for each T and p, and from time p on its lower one.
     time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
     laws = jax.tree.map(np.asarray, _laws(jnp.asarray(p / time)))
     edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)

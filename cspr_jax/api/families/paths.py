@@ -76,7 +76,7 @@ def least_time_paths(
     ramp_time: RampTime = 0.0,
     limits: LimitsOrSpec = None,
 ) -> LeastTimePaths:
-    """Find motions along many paths in the least time that the limits allow, from rest to rest.
+    """Find motions along many paths in the least time that the limits allow, each from zero speed to zero speed.
 
     Args:
         robot: a robot, a name in the catalogue, or the path of a robot file.

@@ -41,8 +41,8 @@ def swing_range(
         limits: a floor, z in the robot's axes, and no other limit; None: those of the robot.
 
     Returns:
-        the launches, in the robot's axes. A formula proves that they are feasible. It is not proved that no slower
-        launch is feasible: times of flight are searched.
+        the launches, in the robot's axes. Formulas prove that they are feasible and that none is slower at the
+        same time of flight. Times of flight are searched: a slower launch at another time is not excluded.
 
     Raises:
         InputError: the wrong kind of robot, spools in several planes, pulleys, limits other than a floor, shapes that

@@ -4,11 +4,11 @@ A Bezier curve of the second order, traversed by half a period of a cosine, is a
 pseudotensions along it are polynomials of low degree in the cosine of the phase, whose coefficients depend on
 r = (T / pi)^2: their minima are exact, and the durations at which a verdict can change are roots of polynomials. A
 launch releases an object on a segment that passes the position of the release with the velocity that the flight
-requires. On more cables than degrees of freedom tensions are enclosed over time instead, and durations are searched for
-by samples.
-
 requires. With more cables than degrees of freedom, tensions are enclosed over time instead, and durations are searched
 for by samples.
+
+Source: the launch paper, section 3.1 (curve) and the sections after it (release and free flight).
+
 Files, each importing only from those above it:
 
     motion                positions over time, section 3.1

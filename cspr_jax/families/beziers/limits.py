@@ -1,8 +1,8 @@
 """Proved lower bounds of the smallest slacks of limits along Bezier segments.
 
-In c = cos(pi tau) every limited quantity is made of polynomials: squares of cable lengths, lengths times their rates,
-pseudotensions, the depth. Over a block of c, Bernstein coefficients bound each polynomial and its derivatives; interval
-jets carry these bounds to the slacks.
+In c = cos(pi tau) every limited quantity is made of polynomials: squares of cable lengths and of lengths times their
+rates, pseudotensions, the depth. Over a block of c, Bernstein coefficients bound each polynomial and its derivatives;
+interval jets carry these bounds to the slacks.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ class EllipseMap(PointMassMap):
     proves = True
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
-        """Refuse ellipses with no radius or with two kinds of it, and frequencies without a rule."""
+        """Refuse ellipses without a size or with two, and frequencies without a rule."""
         super().__init__(robot_file, sweep_file, file)
         robot, axes = self._problem.robot, sweep_file.axes
         self._ellipse, self._is_planar = sweep_file.ellipse or SweepEllipse(), robot.dof == PLANAR

@@ -32,7 +32,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
 
-# Shortest and longest time of flight of a grid, over the time of a fall from the spools to the centre, and its number.
+# Shortest and longest time of flight of a grid, times the natural frequency at the centre, and the number of times.
 SHORTEST = 0.01
 LONGEST = 100.0
 GRID = 257
