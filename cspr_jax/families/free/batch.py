@@ -26,7 +26,7 @@ from cspr_jax.verification.proved_answers import MotionProof, answers_of, proofs
 # on the next. Plans use more intervals, and their motions are some parts in a thousand faster.
 MESHES = ((12, 32), (16, 28), (24, 36))
 SAMPLES = 4  # samples of each interval
-TRIED = 2  # number of pairs of weight and softness, from `FINE`, tried on one mesh
+TRIED = 2  # number of pairs of weight and softness, from `FINE` and from `ON`, tried on one mesh
 
 
 class ManyFreeMotions(NamedTuple):

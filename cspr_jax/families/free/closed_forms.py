@@ -17,7 +17,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.model.point_mass import spool_radius
 
-# Motions may miss poses by this fraction of the robot's radius, and of the speed of a fall by the radius.
+# Motions may miss poses by this fraction of the robot's radius r, and velocities by this fraction of sqrt(g r).
 NEAR = 1e-9
 # No search starts from Rodrigues vectors longer than this.
 FAR = 10.0
@@ -31,7 +31,7 @@ class ClosedForm(NamedTuple):
         motions: n of them, in the axes of the kernels.
         is_feasible: (n,) whether each is proved.
         duration: (n,) s.
-        answers: answers of the motions, from their proofs as splines.
+        answers: answers of the motions; None unless all are proved in the way that splines are.
     """
 
     family: str
@@ -65,7 +65,7 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
 
 
 def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
-    # Tell whether motions are proved and start and end as the poses say; accelerations may differ.
+    # Tell whether all proved motions start and end as the poses say; accelerations may differ.
     radius = float(spool_radius(problem.robot))
     speed = np.sqrt(radius * float(problem.robot.gravity))
     for i in np.flatnonzero(form.is_feasible).tolist():

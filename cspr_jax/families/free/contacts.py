@@ -26,17 +26,17 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.criteria import has_extent
 from cspr_jax.verification.piece_slacks import PieceSlacks
 
-# Lengths below are relative to the robot's radius.
+# Clearances below are relative to the robot's radius.
 NEAR = 0.1  # clearance below which bodies are separated by planes
-MIN_CLEARANCE, MAX_INCREASE = 1e-4, 0.02  # clearance that planes keep at first, and its largest increase per search
-STEP = 1e-6  # step of difference quotients
+MIN_CLEARANCE, MAX_INCREASE = 1e-4, 0.02  # smallest clearance that planes keep, and its largest increase per search
+STEP = 1e-6  # step of the coordinates in difference quotients
 # Searches round obstacles start from motions deflected by these multiples of the deflection of lines; searches for
 # platforms take long, and use the first multiple alone.
 WIDER = (1.0, 2.0)
 SLOWER = 1.5  # durations of these starts over those of the motion that meets an obstacle
 SOFTNESS = 10.0  # softness of the first search
 GO_ON = (1e-3, 1e-1)  # weight of the barriers, and softness, of further searches
-SEARCHES = 4  # largest number of searches; each is from all starts together
+SEARCHES = 4  # largest number of searches from each start; those from all starts run together
 
 
 class _Gap(NamedTuple):
@@ -158,7 +158,8 @@ def _parted(
 
 
 def _linear(tasks: Tasks, samples: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
-    # Return clearances (l, s, m, n), m, and their gradients (l, s, m, n, d) by the coordinates; NaN for bodies apart.
+    # Return clearances (l, s, m, n), m, and their gradients (l, s, m, n, d) by the coordinates. Clearances are NaN for
+    # bodies apart, and where the poses at both ends do not have the same sign.
     def values(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         quaternions = quaternions_of(tasks, points)
         flat = points.reshape(-1, points.shape[-1])
@@ -185,7 +186,7 @@ def _gap(question: FreeQuestion, scene: Scene, pair: ContactPair) -> _Gap:
         return _Gap(_between_lines(scene, k, other), True, 0.5 * float(scene.diameters[[k, other]].sum()))
     if kind == "platform" and scene.body is None:
         return _Gap(_over_face(question, scene, k), True, 0.0)
-    # Return a scene in which only one pair can touch.
+    # Make a scene in which only this pair can touch.
     cable = [max(k, 0)]
     alone = dataclasses.replace(
         scene,

@@ -29,10 +29,10 @@ FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # `FINE`. On fewer intervals a search gets stuck less often, but motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # Searches of single segments: divisor of the number of intervals, and softness. All but the last are for segments whose
-# best motion only one start has led to so far; the last, on few intervals, is for segments without a motion.
+# best motion no two starts have led to so far; the last, on few intervals, is for segments without a motion.
 SEARCHES = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0))
 FEWEST = 3  # smallest number of samples of each interval
-SAME = 1e-3  # relative difference of durations within which two motions are the same
+SAME = 1e-3  # relative difference of objectives within which two motions are the same
 # Searches of single segments end after this fraction of the search time, once each has a motion. The rest is for the
 # search of all segments together, and for tightening.
 ENOUGH = 0.5
@@ -70,7 +70,7 @@ class FreeMotion:
     """The best motion that the search has found.
 
     Fields:
-        motions: one per segment; if the search did not converge, those of its last step.
+        motions: one per segment; if the search did not converge, the last ones that it tried.
         answers: answers of the motions: proved, refuted or undecided.
         energy: (n,) integral of the sum of the squares of the tensions over each segment, N^2 s.
         level: (n,) level of the objective, as `objectives` defines it.
@@ -78,7 +78,7 @@ class FreeMotion:
         is_stopped: whether Ctrl-C, or `search_time`, ended the search early.
         searched: duration of all segments before bounds are tightened, s; NaN without a motion.
         parts: best motion along each segment by itself.
-        families: (n,) family of each motion that replaces the search's own; None: all are the search's own.
+        families: (n,) family whose motion replaces the search's own; None where none does, () if none does anywhere.
     """
 
     motions: list[Spline]
@@ -148,7 +148,7 @@ def _searched(
     lines: Sequence[ClosedForm],
 ) -> tuple[list[SegmentMotion], bool]:
     # Return the best motion along each segment by itself, and whether the search was stopped (Ctrl-C raises if there is
-    # no motion to keep). With closed forms, the first search starts from these instead of the usual starts.
+    # no motion to keep). With closed forms, all searches start from these instead of the usual starts.
     settings, poses = question.settings, question.poses
     # Motions from earlier searches do not come from a start of this search.
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}

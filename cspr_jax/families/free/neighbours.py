@@ -52,7 +52,7 @@ class Neighbours:
         return np.flatnonzero(~np.isfinite(self.duration))
 
     def search(self) -> None:
-        """Search from the first starts, from neighbours' motions, then, where no motion is found, from all starts."""
+        """Search from the first starts, from neighbours' motions, then, where none is found, from the other starts."""
         self._from_starts(np.arange(len(self.duration)), others=False)
         self._from_neighbours()
         if len(self.lacking):

@@ -110,7 +110,7 @@ def no_slower(
     settings: FreeSettings,
     forms: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """The motion, or that of a closed form through the same poses where it is faster."""
+    """The motion, or a closed form through the same poses that is faster, or proved when the motion is not."""
     is_proved = bool(free.answers.feasible.all())
     for form in sorted(forms, key=lambda one: float(one.duration.sum())):
         full = float(form.duration.sum())
@@ -126,7 +126,7 @@ def no_slower(
 def _followed(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
 ) -> FreeMotion | None:
-    # Double the intervals of the spline until it is proved; at the poses it has the closed form's accelerations.
+    # Double the intervals of the spline until it is proved; it has the accelerations that the poses prescribe.
     question = FreeQuestion.of(problem, scene, poses, settings)
     arcs = float(form.duration.max()) / half_swing(problem, poses)
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))

@@ -25,7 +25,7 @@ from cspr_jax.schema.verdicts import Verdict, criterion_words
 JUMP = 0.01  # an acceleration jumps if it changes by more than this fraction of the largest one
 DIGITS = 4  # digits of numbers in messages
 DECIMALS = 5  # decimals of positions in messages, m
-# Largest number of binding criteria that a message names.
+# Largest number of binding criteria that an answer names.
 MOST_BINDING = 10
 # Flags of criteria that a slower motion may meet.
 OF_SPEED = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_motion), Verdict.WRENCH_INFEASIBLE)

@@ -82,7 +82,7 @@ def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
 
 
 def _beside(ends: np.ndarray, dimensions: int) -> list[np.ndarray]:
-    # Return points (3,) beside the middle of a line, given by its ends (2, 3), in its vertical plane and across it.
+    # Return points (3,) on both sides of the middle of a line with these ends (2, 3): in its vertical plane and across.
     along, middle = ends[1] - ends[0], ends.mean(0)
     length = float(np.linalg.norm(along))
     if length <= SAME_PLACE:

@@ -70,7 +70,7 @@ class Paths(Leg):
     """Poses joined along paths in the least time; see `Leg`."""
 
     def __init__(self, waypoints: Waypoints) -> None:
-        """Refuse keys of other families, and contradictions between a path and its poses."""
+        """Refuse keys of other families, and values that both a path and its poses give."""
         super().__init__(waypoints)
         self._notes: list[str] = []
         self._refuse("arcs", "beta_hat")
@@ -141,7 +141,7 @@ class Paths(Leg):
 
     @property
     def _runs(self) -> list[PathRun]:
-        # A path ends at rest, and at a pose before one that has a path of its own.
+        # A path ends at a pose that rests, that has a path of its own, or whose next pose has one.
         poses, spec, first, runs = self.waypoints.poses, self.waypoints.plan_file, 0, list[PathRun]()
         usual = PathTable() if spec.path is None or spec.is_one_path else spec.path
         for i, pose in enumerate(poses[1:], start=1):
@@ -165,7 +165,7 @@ class Paths(Leg):
         )
 
     def _path_spec(self, run: PathRun, positions: np.ndarray, units: np.ndarray | None) -> PathSpec:
-        # Return the path through poses, in the axes of the robot file.
+        # Return the path that joins the poses of a run, in the axes of the robot file.
         waypoints, table = self.waypoints, run.table
         if not table.is_whole:
             chosen = slice(run.first, run.last + 1)
@@ -228,7 +228,7 @@ def _parts(count: int) -> str:
 
 
 def _cells(spec: PathSpec, grid: int) -> int:
-    # Refuse too many cells, which could not be proved, before the work takes hours.
+    # Count the cells of the grids of a path. Refuse more than a proof can handle, before the work takes hours.
     cells = sum(max(grid, len(path.s) - 1) for path in spec.parts)
     if cells > MOST_CELLS:
         error = f"{_parts(len(spec.parts))}: {cells:,} cells"

@@ -38,7 +38,7 @@ UNEVEN = 0.1
 QUARTERS = np.linspace(0.0, 1.0, 5)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 AXES = 3
-# Except at stops, the mass centre is faster than this fraction of the platform's speed, or the platform only turns.
+# At ends that are not stops, the mass centre must be faster than this fraction of the speed that includes rotation.
 TURNS = 1e-6
 
 

@@ -79,7 +79,7 @@ def basis(intervals: int, samples: int) -> Basis:
     derivatives = [spline.derivative(order)(tau) for order in range(3)]
     functions = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
     averages = np.array([knots[k + 1 : k + 1 + DEGREE].mean() for k in range(count)])
-    # Return the matrix from values at six points of an interval to Bernstein coefficients.
+    # Bernstein coefficients follow from the values at six points of each interval.
     fraction = np.linspace(0.0, 1.0, LOCAL)[:, None]
     power = np.arange(LOCAL)
     bernstein = np.array([comb(DEGREE, k) for k in power]) * fraction**power * (1.0 - fraction) ** power[::-1]

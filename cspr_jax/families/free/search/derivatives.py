@@ -38,8 +38,8 @@ class EquationValues(NamedTuple):
     level of the objective; the equations do not depend on the level.
 
     Fields:
-        residual: (..., n_equations) wrench that the tensions fail to supply, over the weight; then, for values other
-            than tensions, minus the value of the state, to which the search adds the unknown value.
+        residual: (..., n_equations) wrench of the tensions minus the required one, over the weight; then, for values
+            other than tensions, minus the value of the state, to which the search adds the unknown value.
         jacobian: (..., n_equations, n_x).
         matrix: (..., dof, n_cables) wrenches of unit tensions.
         hessian: (..., n_x, n_x) second derivatives of the residuals times multipliers.

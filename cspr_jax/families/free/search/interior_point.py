@@ -2,7 +2,7 @@
 
 Bounds are kept by barriers. Residuals of the equations are penalised (an augmented Lagrangian, with the multipliers of
 the last optimum), so that from every start the search can descend to a motion without residuals; the weights of the
-barriers and the softness of the equations fall together. Steps are Newton's, as long as the merit falls along them.
+barriers and the softness of the equations fall together. Steps are Newton's, shortened until the merit falls.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from cspr_jax.numerics.shapes import Bool, Float
 
 # Weight of the barriers at the start and at the end; it falls to the smaller of a fraction and a power of itself.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
+# Softness of the equations at the start and at the end, and the factor by which it falls.
 SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
 CLOSE = 10.0  # the weight of the barriers falls once errors of Newton's equations are below this multiple
 MISSED = 1e-6  # largest residual of the equations at an optimum
 STEPS, PATIENCE = 250, 80  # largest number of steps, in all and with one weight of the barriers
-# Distance of values from their bounds at the start: the smaller of this fraction of the range and this number.
+# Least distance of values from their bounds at the start: the smaller of this fraction of the range and this number.
 INSIDE, AWAY = 0.1, 1e-2
 # Multipliers of bounds differ at most by this factor from the weight of the barriers over the gap.
 MAX_RATIO = 1e10
@@ -198,7 +199,7 @@ def started(
     level, inner = np.full(duration.shape, tasks.objective.start), controls[:, :, OUTER:-OUTER].copy()
     unknowns = Unknowns(inner, duration.copy(), acceleration, level, values, empty, values, values)
     equations, residual = tasks.equations(unknowns)
-    # Return tensions that balance the motion and are nearest to the middle of their range.
+    # Take the tensions that balance the motion and are nearest to the middle of their range.
     low, high = tasks.bounds(level)
     middle = 0.5 * (low[..., :cables] + high[..., :cables])
     matrix = equations.matrix

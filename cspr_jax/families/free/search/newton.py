@@ -16,7 +16,7 @@ from cspr_jax.numerics.shapes import Float
 # Smallest and largest regularization, added to the diagonal of a matrix that is not positive definite.
 MIN_REGULARIZATION, MAX_REGULARIZATION = 1e-6, 1e6
 GROWING = 6.0  # growth of the regularization from one try of a step to the next
-SHRINKING = 3.0  # the next step first tries the last regularization over this
+SHRINKING = 3.0  # the next step that needs one first tries the last regularization over this
 TRIES = 25
 
 
@@ -206,7 +206,7 @@ def _with_objective(
     barrier: np.ndarray,
 ) -> tuple[EquationValues, np.ndarray, np.ndarray, np.ndarray]:
     # Return the equations with derivatives of objective and barriers added, second derivatives and right-hand side of
-    # the values, and the derivative of the objective by duration and level, (l, s, 2).
+    # the values, and derivatives by duration and level, (l, s, 2).
     objective, cables, energy_weights = tasks.objective, tasks.robot.n_cables, tasks.energy_weights
     lifts, signs = (objective.low_lift, objective.high_lift), (1.0, -1.0)
     weights = [old / gap for old, gap in zip((unknowns.low_multipliers, unknowns.high_multipliers), gaps, strict=True)]

@@ -13,7 +13,7 @@ from cspr_jax.families.free.search.newton import Step, assembled_gradient
 from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Float
 
-LARGE = 100.0  # errors are relative to the mean multiplier of bounds if it is above this
+LARGE = 100.0  # if the mean multiplier of bounds is larger, errors are divided by the mean over this
 REGULAR = 1e-6  # regularization of the metric of the tensions
 
 

@@ -135,7 +135,7 @@ class Tasks:
         )
 
     def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
-        """Unknowns from those of tasks with other planes: with values of the planes, and multipliers 0 for them."""
+        """Unknowns of these tasks as those of tasks with other planes, with given values of these and multipliers 0."""
         old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
 
         def changed(values: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ from cspr_jax.verification.criteria import pose_conditions
 ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)  # of directions in the vertical plane of both positions
 SAFE = 1e-9  # bounds are lowered by this fraction, which exceeds rounding errors
 LEVEL = 1e-12  # spools are level if their heights differ by less, over the robot's radius
-SLANTED = 1e-5  # largest effect of such a difference on the upward component of a direction
+SLANTED = 1e-5  # largest increase of a component of a cable's direction by such a difference
 Numbers = np.ndarray | float
 
 

@@ -15,7 +15,7 @@ from cspr_jax.families.paths.geometry.elements import Element, Nodes
 from cspr_jax.families.paths.geometry.section import PositionPath
 
 SAME_DIRECTION = 1e-9  # rad; directions that differ by less form no corner
-ROUNDED_DIRECTION = 1e-3  # rad; corners below this are due to rounded numbers, and always blended
+ROUNDED_DIRECTION = 1e-3  # rad; corners below this are due to rounding, and blended even if others are stops
 ROUNDED = 1e-6  # m; tolerance of blends at such corners
 # Corners sharper than this, rad, are not blended: a motion along the blend would almost stop.
 TURNING_BACK = 2.9

@@ -61,7 +61,7 @@ class PathSpec(NamedTuple):
     Fields:
         parts: the paths, at least one.
         quaternions: for each path the orientations at its knots, (k, 4) unit quaternions; empty for a point mass.
-        is_planar: whether the table or file has no y.
+        is_planar: whether the points are from a file without y.
         feeds: words of G-code by speed; see `Section`.
         notes: lines for the user about the file.
     """

@@ -45,7 +45,7 @@ BATCH = 64
 SAFE = 1e-10
 REPAIRS = 12  # largest number of rounds that repair multipliers
 SPREAD = 20  # cells on each side whose multipliers change to repair a cell
-SPARE = 1.5  # total change of these multipliers over the missing decrease
+SPARE = 1.5  # decrease that a repair adds in the cell, over the missing one
 DOWN = 2  # axis of forces along gravity
 MORE = 1.01  # added weight over missing weight
 

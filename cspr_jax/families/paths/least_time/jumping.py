@@ -43,7 +43,7 @@ class Jumping(NamedTuple):
     Fields:
         run: path speeds and accelerations; None if there is no motion.
         u_rate: (n_cells,) change of u along each cell, over its width.
-        first: solution with constant u in each cell.
+        first: solution with constant u in each cell or, if that has no motion, with the changes of u of a given motion.
     """
 
     run: PathSpeeds | None

@@ -64,7 +64,7 @@ class NoMotion(NamedTuple):
     """Why no motion runs along a section.
 
     Fields:
-        coordinate: s of the point that no motion can pass, m.
+        coordinate: s of the point at which the motion fails, m.
         position: (3,) this point, in the axes of the kernels, m.
         names: flags and cables of the criterion that needs a path acceleration at the point, and of the one that
             forbids it; None for the rest of the path, which limits the speed; () if the speed at an end is refused.
