@@ -141,7 +141,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
 
 
 def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
-    """Write the motion of a plan to a .csv or .h5 file, which says whether the plan is feasible."""
+    """Write the motion of a plan to a .csv or .h5 file, which says so if the plan is not feasible."""
     is_motion = np.isfinite(plan.answers.duration).all()
     columns = rows(plan, rate=rate) if is_motion else {"t": plan.answers.duration}
     if not all(np.isfinite(values).all() for name, values in columns.items() if name not in OPEN):
@@ -225,7 +225,7 @@ def _write_others(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
 
 
 def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Intervals of time that are proved to break a limit or to leave cables slack, over all segments."""
+    """Intervals of time in which segments fail, for all segments that are proved or refuted at all their times."""
     starts = np.cumsum(plan.answers.duration) - plan.answers.duration
     intervals = [
         start + np.reshape(plan.details(i).get("failing", ()), (-1, 2)) for i, start in enumerate(starts.tolist())

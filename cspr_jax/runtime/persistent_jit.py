@@ -179,7 +179,7 @@ class _Programs:
 
 
 def _name(function: Callable) -> str:
-    # The module's name now refers to the compiled function, so identify the original by its module and line.
+    # The module's name now refers to the compiled function, so identify the original by its module and qualified name.
     name = f"{function.__module__}:{function.__qualname__}"
     if not name.startswith(f"{__name__.partition('.')[0]}.") or "<" in name:
         raise Undescribed(name)

@@ -1,7 +1,7 @@
 """Worker processes on this machine, which share its cores and end with their parent.
 
 Threads of one process run work outside of XLA one after the other, while XLA's own threads wait in loops: if much work
-is outside of XLA, one process with one thread for each core is faster.
+is outside of XLA, as many processes as cores, each with a single thread, are faster.
 """
 
 import concurrent.futures

@@ -22,7 +22,7 @@ class _Board:
         if listener is None:
             return
         parts = [*self.around, self.now]
-        # The function whose compilation began last usually takes longest.
+        # Usually users wait longest for the function whose compilation began last.
         parts += [f"compiling {name}" for name in list(self.compiling.values())[-1:]]
         listener(": ".join(part for part in parts if part))
 

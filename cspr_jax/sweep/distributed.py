@@ -81,7 +81,7 @@ class Scheduler:
         except BaseException:
             self.close()
             raise
-        # Like a tile, dask computes it again if its worker is lost.
+        # dask makes it again, like a tile, if its worker is lost.
         self._sweep = self._client.submit(bytes, pickle.dumps(sweep), pure=False)
 
     def _wait_for_workers(self, stop: Stop) -> None:

@@ -29,7 +29,8 @@ class ArcError(ValueError):
 
 def missed(half: float) -> float:
     """Largest difference of the radii at start and end that comes from rounding of coordinates by up to `half`."""
-    # Rounding of both coordinates of the centre adds sqrt(2) halves at the start, and three times as much at the end.
+    # The radius at the start is off by sqrt(2) halves, from the offset of the centre; the radius at the end by three
+    # times as much, since on each axis start, offset and end are rounded.
     return 4.0 * math.sqrt(2.0) * half
 
 

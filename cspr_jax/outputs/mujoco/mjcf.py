@@ -206,7 +206,7 @@ def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body
 
 
 def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
-    # A positive control shortens the cable; none can push. Where there is no limit, leave a reserve for a controller.
+    # A positive control shortens the cable; no cable can push. Without a limit, leave a reserve for a controller.
     maximum = np.maximum(moved.tension.max(0), 0.0)
     largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * maximum.max()), maximum)
     for k, tension in enumerate(largest.tolist(), 1):

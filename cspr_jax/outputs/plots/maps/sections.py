@@ -132,7 +132,7 @@ def section_figure(
 
 
 def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
-    # Choose sections evenly. If a section with marks is not among them, show it in place of the one nearest to it.
+    # Evenly chosen sections, in which each section with marks that is missing replaces the one nearest to it.
     indices = shown.tolist()
     for index in marked_indices:
         if index not in indices:

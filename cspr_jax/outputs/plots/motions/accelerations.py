@@ -1,8 +1,8 @@
 """Diagram of the feasible accelerations at a time of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
 
-For a planar robot, everything is in one plane. For a spatial one, there are three sections through the actual
-acceleration: a level one, a vertical one that contains zero and gravity too, and a vertical one normal to the nearest
-face, which shows the margin in its true size.
+For a planar robot, everything is in one plane. For a spatial one, there are sections through the actual acceleration:
+a level one, a vertical one that contains zero and gravity too, and a vertical one normal to the nearest face, which
+shows the margin in its true size. The two vertical ones may be the same.
 """
 
 from typing import Any, NamedTuple

@@ -35,7 +35,7 @@ for _limit in LIMITS:
         SHOWN[_limit.chart] = SHOWN.get(_limit.chart, Verdict.FEASIBLE) | _limit.flag
 # Largest number of segments whose boundaries are drawn: more lines would hide the rest.
 BOUNDARIES = 200
-# Points lie in a plane if they are closer to it than this fraction of the distance between spools: typed numbers are
+# Path and spools lie in one plane if their extent along y is at most this fraction of that along x: typed numbers are
 # rounded.
 ONE_PLANE = 1e-9
 # Limits beyond this multiple of the largest value are named in the legend, but not drawn.

@@ -65,7 +65,7 @@ def _top(low: np.ndarray, high: np.ndarray, speed: np.ndarray) -> float:
 
 
 def _names(data) -> list[tuple[int, int]]:
-    # Binding limits, in the order of their numbers of nodes.
+    # Binding limits, those that bind at most nodes first.
     pairs, counts = np.unique(
         np.stack([data["path_binds"].astype(int), data["path_binding_cable"].astype(int)]), axis=1, return_counts=True
     )
