@@ -19,7 +19,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import look_alike
 
 LARGEST_FILE = 1 << 20
-# Largest number of parts of a dotted key: the time that tomllib takes grows with its square.
+# Dotted keys of this number of parts or more are refused: the time that tomllib takes grows with its square.
 LONGEST_KEY = 64
 LARGEST_LINES = 1000  # largest number of errors of one file that are listed
 _PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""

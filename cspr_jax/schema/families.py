@@ -30,7 +30,8 @@ class Family:
         legs: for each pattern of motion of the robots that it moves, a row of `robots.model.patterns`, the class that
             joins poses: "module:Class".
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) instead of (2.49).
-        rests_anywhere: whether its motions rest at all poses, so that it has neither P0 nor an amplitude function.
+        rests_anywhere: whether its motions can rest at any position, so that it has neither P0 nor an amplitude
+            function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         takes_amplitude: whether its motions follow the plan's amplitude function, rather than a law of their own.
         keys: keys of a plan that are allowed only with this family, and with others that list them too.

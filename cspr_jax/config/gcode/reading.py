@@ -199,7 +199,7 @@ class _GcodeReader:
         self._begin()
 
     def _go_home(self, name: str, axes: dict[str, Word]) -> None:
-        # Only the machine knows the home position: the path begins after the first such move, or ends before it.
+        # Only the machine knows the home position: the path begins after such a move, or ends before it.
         self.skipped[name] += 1
         if self.moves:
             self.away = self.away or f"line {self.line}, {name}"

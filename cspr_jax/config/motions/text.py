@@ -34,7 +34,7 @@ OVERLAP = 100
 # Quaternions whose norm is within UNIT of 1 count as unit ones; others from SHORTEST to LONGEST are normalised with a
 # note, and all others refused.
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
-MEETING = 1e-6  # largest gap where legs meet, as a fraction of the extent of the motion
+MEETING = 1e-6  # largest jump of positions or velocities where legs meet, as a fraction of their largest values
 
 EMPTY = (",", ";", "\t", " ")  # first characters of lines that may consist of separators alone
 _COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)

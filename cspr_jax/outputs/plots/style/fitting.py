@@ -22,7 +22,7 @@ SHORTEST = 8
 HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
 # Beginning of the line of a title that names segments that are not proved feasible.
 DOUBT = "NOT PROVED FEASIBLE"
-# Largest fraction of a panel's slot that tick labels may fill.
+# Largest width of a legend above a panel, as a fraction of the panel's slot: tick labels take the rest.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
 # Largest numbers of intervals between ticks, tried one after the other.
