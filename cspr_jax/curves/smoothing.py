@@ -23,8 +23,8 @@ HIGHEST = 24.0
 STEPS = 4.0  # increment of the power in the search for its upper bound
 POWER_ERROR = 1e-4  # tolerance of the search for the power
 REFINEMENTS = 3  # number of iterative refinements: matrices are badly conditioned where weights are large
-# A record moves at an end if assuming rest there raises the squared errors of a polynomial by FACTOR, and the squared
-# second derivatives of the smoothed curve by COSTS.
+# A record moves at an end if, with rest assumed there, the squared errors of a polynomial are more than FACTOR times as
+# large as without, and the squared second derivatives of the smoothed curve more than COSTS times.
 FACTOR = 2.0
 COSTS = 1.03
 SURE = 4.0  # standard deviations, of the sum of squared errors, that are ascribed to noise

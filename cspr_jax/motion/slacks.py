@@ -1,7 +1,7 @@
 """Slacks of any motion: functions of its state at one time that are positive exactly while a criterion is met.
 
 They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. With n
-the number of cables and kappa_k the tension of cable k over its length, their order is:
+the number of cables, kappa_k the tension of cable k over its length, and values at rest in P0, their order is:
 
     taut       kappa_k over its value at rest; for a point mass without pulleys, the pseudotension over its value at
                rest; for a platform, n z0 mu_k / g

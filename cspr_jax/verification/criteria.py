@@ -52,7 +52,7 @@ class Criterion(NamedTuple):
         obstacle: index of the obstacle; None: no obstacle is concerned.
         allowed: smallest or largest value that is allowed.
         sense: whether `allowed` is a lower ("least") or an upper ("most") limit.
-        allowance: amount by which the quantity may exceed it, since limits may be touched.
+        allowance: amount by which the quantity may violate it, since limits may be touched.
     """
 
     flag: Verdict

@@ -21,7 +21,7 @@ from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, radi
 # Half of the length of short blocks, over a usual length.
 SHORT = 1e-6
 LOOSE = 0.5  # bounds of a piece are close if they differ by less than this fraction of the violation,
-SMALLEST = 1e-7  # or by less than this in the unit of the slack
+SMALLEST = 1e-7  # which counts as no smaller than this, in the unit of the slack
 HALVINGS = 5  # largest number of halvings of a piece
 Sides = tuple[np.ndarray, np.ndarray]
 

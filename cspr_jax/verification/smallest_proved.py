@@ -23,7 +23,8 @@ class Smallest(NamedTuple):
 
     Fields:
         number: (n,) smallest number that is proved; NONE: there is none.
-        undecided: (n,) smallest number up to `number` that stayed undecided; NONE: there is none.
+        undecided: (n,) smallest number up to `number` that stayed undecided, or left smaller ones undecided; NONE:
+            there is none.
     """
 
     number: np.ndarray

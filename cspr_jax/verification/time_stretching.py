@@ -24,7 +24,7 @@ class Stretching(NamedTuple):
 
     Fields:
         factor: factor of durations that is proved feasible; NaN: none was found.
-        proof: proof of the stretched motion; if none is feasible, of the one with the largest margin.
+        proof: proof of the stretched motion; if none was found, of the motion stretched by `SLOWEST`.
         is_static: whether the path is proved feasible at rest at all points, so that some stretching is feasible.
     """
 

@@ -9,7 +9,7 @@ planned robot, and B a right inverse of A in the middle of the block. Then phi =
 
 component by component: A' is the matrix of the other robot and A_c that of the planned robot in the middle of the
 block, G bounds B (A - A_c), and D_kj = |part of g_kj across u_j| t_j, where g_kj is the derivative of row k of B A with
-respect to ray j. Where x >= b + (G + D) x for some x > 0 the spectral radius of G + D is below 1; then such a d exists
+respect to u_j. Where x >= b + (G + D) x for some x > 0 the spectral radius of G + D is below 1; then such a d exists
 with |d| <= x, and A' has full rank. Cauchy's inequality bounds B delta w for a displaced mass centre.
 
 With as many cables as components a closer bound follows (docs/theory.md): until a first tension k reaches its smallest
@@ -33,11 +33,12 @@ from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 
-# Relative surplus by which solutions of inequalities are enlarged, so that they hold in spite of rounding.
+# Relative surplus by which solutions of inequalities are enlarged, so that they hold in spite of rounding, and smallest
+# change of tensions, over the largest tension.
 SURPLUS = 1e-9
 # Number of rounds in which the functionals y are corrected.
 ROUNDS = 8
-SPARE = 0.01
+SPARE = 0.01  # relative surplus of each correction
 
 
 class UncertainTensions(NamedTuple):

@@ -190,7 +190,7 @@ def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array
 
 
 def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
-    """Distance of a segment from a polyhedron that it does not enter: smallest distance from an edge, or of an end."""
+    """Distance of a segment from a polyhedron that it does not enter: from an edge, or of an end from a face."""
 
     def to_edge(edge, smallest):
         start, end = hull.edges[edge, 0], hull.edges[edge, 1]

@@ -158,7 +158,7 @@ def _check_planar(points: np.ndarray) -> None:
 
 
 def checked_points(key: str, points, count: int) -> Float[np.ndarray, "n 3"]:
-    """Check points of a robot, which must not lie on one line, and their number."""
+    """Check points of a robot, and their number; if three or more are required, they must not lie on one line."""
     points = checked_coordinates(key, points, count)
     if count > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")

@@ -6,7 +6,8 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Bool, Float
 
-# Points lie on a line, or in a vertical plane, if a ratio of areas is below this.
+# Points lie on a line if their second spread over the first is not above the first number; their plane is vertical if
+# its area as seen from above, over its area in space, is not above the second.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
 # Points closer to P0, or to a line through P0, than this fraction of the radius of the spools count as lying there.
@@ -39,7 +40,7 @@ def largest_radius(base_points: Float[np.ndarray, "n 3"]) -> float:
 def in_plane(
     base_points: Float[np.ndarray, "n 3"], points: Float[np.ndarray, "k 3"], *, planar: bool = False
 ) -> Bool[np.ndarray, "k"]:
-    """Tell whether points lie in the spool plane."""
+    """Tell which points lie in the plane of all spools; none does where the spools do not share one plane."""
     spools = np.concatenate([base_points, base_points + np.array([0.0, 1.0, 0.0])]) if planar else base_points
     if len(spools) < 3 or is_on_line(spools) or is_vertical(spools):
         return np.zeros(len(points), bool)

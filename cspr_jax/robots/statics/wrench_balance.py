@@ -53,7 +53,7 @@ def is_regular(determinant):
 def determinant_ratio(
     robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
 ) -> Float[Array, ""]:
-    """Normalised determinant over its value in the reference orientation at the same depth below the centroid."""
+    """Normalised determinant over that in the reference orientation below the centroid, as far below the spools."""
     middle = rest_point(plane_normal(robot) @ position)
     return normalised_determinant(robot, position, rotation) / normalised_determinant(robot, middle, jnp.eye(3))
 

@@ -47,7 +47,8 @@ LONGEST_STEP = 0.99  # length of the longest step over the distance to the neare
 # Distances of tensions from the reference below this fraction of the largest one are raised to it: at a distance of 0 a
 # second derivative would be infinite.
 NEAR = 1e-9
-# For cables without a largest tension the search begins below this multiple of the largest tension of least norm.
+# For cables without a largest tension the search begins below this multiple of a sum: the largest tension of least
+# norm, the largest `tension_min` and the largest reference tension.
 FAR = 10.0
 EXPONENT = 4.0
 MIN_EXPONENT = 1.01

@@ -46,7 +46,7 @@ class TimeBlocks(NamedTuple):
     def rest(
         self, level: np.ndarray, matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Undecided part of each block, outside of which all slacks are proved above or below their levels."""
+        """Part of each block outside of which slacks that matter are above their levels or, with `has_upper`, below."""
         low, high, low_rise, high_rise = self.slacks
         sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
         if has_upper:

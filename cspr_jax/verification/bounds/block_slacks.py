@@ -220,7 +220,7 @@ def block_slacks(
     rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
     at_times = np.array([row.flag in AT_TIMES for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_times]
-    # Extend blocks to the front, so that an event at the border of two blocks lies within an extended block.
+    # Extend blocks to earlier times, so that an event at the border of two blocks lies within an extended block.
     before = np.maximum(2.0 * start - end, 0.0)
     short = np.flatnonzero(is_open.any(1) & (end - before <= SHORTEST))
     if len(short):
