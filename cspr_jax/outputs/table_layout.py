@@ -16,7 +16,7 @@ LEGEND = (
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
 WIDEST = 10  # largest number of columns of a table that is shown in one block
 SIDE_BY_SIDE = 6  # number of columns of each block of a wider table
-DIGIT_ERROR = 1e-9  # relative rounding error of a number, and of half a unit of its last digit
+DIGIT_ERROR = 1e-9  # rounding error of a number, and relative one of half a unit of its last digit
 
 
 @dataclasses.dataclass(frozen=True)

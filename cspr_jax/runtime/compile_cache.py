@@ -2,9 +2,10 @@
 
 jax writes an entry directly under its final name and never again, so that a killed run would leave half an entry for
 ever. Therefore each run has a folder of its own, with links to all complete entries (copies, where the disk has no
-links), and moves its new entries to the common folder when it ends. A kept entry ends with its name and a checksum: an
-entry that is damaged, or a copy of another, is removed before jax sees it; an entry that cannot be used is replaced by
-newly compiled code. Entries are code that is executed: a folder into which others can write is refused.
+links), and moves its new entries to the common folder when it ends. The content of a kept entry ends with its name, and
+the name of its file with a checksum: an entry that is damaged, or a copy of another, is removed before jax sees it; an
+entry that cannot be used is replaced by newly compiled code. Entries are code that is executed: a folder into which
+others can write is refused.
 """
 
 import atexit

@@ -19,8 +19,8 @@ _STEP = 1 << 20
 NO_TRAILER = "it is not whole, or not of cspr"
 
 
-# Errors that mean that there is no such file. All others come from the system or the disk, and do not mean that the
-# file is missing or damaged.
+# Errors that mean that there is nothing of this name, or that it is no regular file. All others come from the system or
+# the disk, and do not mean that the file is missing or damaged.
 _NO_FILE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.ENAMETOOLONG}
 
 

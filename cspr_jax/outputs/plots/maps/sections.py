@@ -143,7 +143,7 @@ def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
 
 
 def _figure_size(result: Result, across: list[str], count: int) -> tuple[float, float]:
-    # Width and height of a panel in inches; panels in metres have the shape of their range.
+    # Width and height of the picture in inches; panels in metres have the shape of their range.
     columns = columns_of(count)
     side = SINGLE if count == 1 else PANEL
     width, height = side, side

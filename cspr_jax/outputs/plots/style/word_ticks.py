@@ -34,7 +34,7 @@ REASONS = {
     Verdict.NOT_FINITE: ("not finite", "#000000"),
 }
 FEASIBLE_COLOUR = "#009E73"
-# Colours of other words, also Okabe and Ito's; they repeat if there are more words.
+# Colours of other words, also Okabe and Ito's; if there are more words, all get shades of a continuous scale.
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
