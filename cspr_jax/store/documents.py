@@ -188,7 +188,7 @@ class Record(Document):
 
 
 def plain_json(text: str | bytes) -> Any:
-    """Parse JSON, and refuse infinite numbers and deep nesting."""
+    """Parse JSON, and refuse numbers that are not finite, and deep nesting."""
     try:
         value = json.loads(text, parse_constant=_not_finite, parse_float=_finite)
     except RecursionError as error:

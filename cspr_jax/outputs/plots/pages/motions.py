@@ -159,7 +159,7 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
 
 
 def _chosen(time: np.ndarray) -> np.ndarray:
-    # Choose rows evenly in time, as many as there are or as a page can hold; rows where segments meet are repeated.
+    # Choose rows evenly in time, as many as there are or as a page can hold; where segments meet there are two rows.
     count = min(len(time), MAX_ROWS)
     times = np.linspace(time[0], time[-1], count)
     return np.unique(np.clip(np.searchsorted(time, times - 1e-12), 0, len(time) - 1))
