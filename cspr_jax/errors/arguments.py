@@ -153,7 +153,7 @@ NUMBER = Numbers("a number", infinite=True, nan=True)
 Positive = Annotated[float, Numbers("a finite number > 0", positive=True)]
 Length = Annotated[float, Numbers("a number > 0, in m", positive=True)]
 Diameter = Annotated[float, Numbers("a number >= 0, in m", minimum=0.0)]
-CableErrors = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one a position", ((), (ANY,)), minimum=0.0)]
+CableErrors = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one for each position", ((), (ANY,)), minimum=0.0)]
 Acceleration = Annotated[float, Numbers("a number >= 0, in m/s^2", minimum=0.0)]
 RampTime = Annotated[float, Numbers("a finite number >= 0, s", minimum=0.0)]
 Phase = Annotated[ArrayLike, Numbers("a finite number, rad", traced=True)]

@@ -161,7 +161,7 @@ _KINDS: dict[str, MapKind] = {
         MapKind(
             name="transition-envelopes",
             title="Envelopes of the pseudotensions along transitions",
-            description="oscillations that each time of a transition from rest to each target requires",
+            description="oscillations required at each time of a transition from rest to each target",
             implementation="cspr_jax.families.swings.transitions.envelopes_map:TransitionEnvelopesMap",
             quantities=columns.OF_INSTANTS,
             stored=columns.OF_INSTANTS,

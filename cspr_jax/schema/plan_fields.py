@@ -84,7 +84,7 @@ SEGMENT = {
     ),
     "feasible_at_infinity": ("1", "Point masses: left-hand side of thesis (2.55)."),
     **_EXTREMES,
-    "samples": ("1", "Number of times at which tensions, lengths and speeds were taken."),
+    "samples": ("1", "Number of samples of tensions, lengths and speeds."),
     "oscillations": ("1", "Transitions: smallest feasible number of oscillations; null: none."),
     "tried_oscillations": ("1", "Transitions: half of `tried_arcs`; absent in other families."),
     "envelope_oscillations": ("1", "Transitions: number of oscillations that the envelopes allow; null: none."),
@@ -181,8 +181,8 @@ SECTION = {
     "binding": ("", "As of a segment."),
     "jumps": (
         "1",
-        "Number of times at which the acceleration changes at once by more than 1 % of the largest one, those of "
-        "the start and the end of a motion from or to rest included.",
+        "Number of jumps of the acceleration by more than 1 % of the largest one, those at the start and the end of a "
+        "motion from or to rest included.",
     ),
 }
 LAUNCH = {

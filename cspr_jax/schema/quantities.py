@@ -485,7 +485,7 @@ QUANTITIES = {
             "margin_bound",
             "1",
             "proved lower bound of the margin",
-            "Proved: no time of the segment has a smaller margin.",
+            "Proved: the margin is no smaller at any time of the segment.",
         ),
         Quantity(
             "feasible_at_infinity",
@@ -974,7 +974,7 @@ QUANTITIES = {
             "tension_margin_bound",
             "N",
             "proved lower bound of the distance of tensions from their limits",
-            "Proved: at no time of the motion is `tension_margin` smaller.",
+            "Proved: `tension_margin` is no smaller at any time of the motion.",
         ),
     )
 }

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support.commands import cspr
+from support.commands import cspr, swept
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -37,10 +37,7 @@ def text(**changes):
 
 def mapped(folder, **changes):
     folder.mkdir()
-    (folder / "s.toml").write_text(text(**changes))
-    code, _, err = cspr("run", folder / "s.toml", "-o", folder / "run")
-    assert (code, err) == (0, ""), err
-    return cspr_jax.open_result(folder / "run" / "s.h5")
+    return swept(folder, text(**changes))
 
 
 @pytest.fixture(scope="module")

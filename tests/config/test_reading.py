@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.texts import PLAN, SWEEP
 
 from cspr_jax.api.files.imports import import_robot
 from cspr_jax.cli import main
@@ -18,25 +19,6 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.sweep.definition import read_sweep
 
-PLAN = """schema = 1
-robot = "prototype"
-z0 = 1.7
-[[pose]]
-rest = true
-[[pose]]
-position = [0.7, 0.7, 3.0]
-"""
-SWEEP = """schema = 1
-map = "minimum-arcs"
-robot = "prototype"
-[axes]
-x = [0.1, 0.2]
-y = [0.2]
-z = { start = 1.0, stop = 2.0, count = 2 }
-z0 = [1.7]
-[trajectory]
-from = { rest = true }
-"""
 ROBOT, Z0, POSE, FROM, AXES = 'robot = "prototype"', "z0 = 1.7", "position = [0.7, 0.7, 3.0]", "from =", "[axes]"
 UP_IN_LINE, UP = "[[0, 1, 3], [1, 2, 3], [2, 3, 3]]", "[[0, 1, 3], [2, 1, 3], [1, 4, 3]]"
 ON_A_LINE, UPRIGHT = "[[0, 0, 0], [1, 0, 0], [2, 0, 0]]", "[[0, 0, 0], [1, 0, 0], [0, 0, 1]]"

@@ -5,6 +5,7 @@ import pickle
 import re
 
 import pytest
+from support.texts import PLAN, SWEEP
 
 from cspr_jax.config import hints, wording
 from cspr_jax.config.plan import PlanFile, read_plan
@@ -19,25 +20,6 @@ SPOOLS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 RING = [[math.cos(angle), math.sin(angle), 0.0] for angle in range(6)]
 HEXAGON = [[math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0), 0.0] for k in range(6)]
 BODY = {"platform_points": RING, "inertia": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]}
-PLAN = """schema = 1
-robot = "prototype"
-z0 = 1.7
-[[pose]]
-rest = true
-[[pose]]
-position = [0.7, 0.7, 3.0]
-"""
-SWEEP = """schema = 1
-map = "minimum-arcs"
-robot = "prototype"
-[axes]
-x = [0.1, 0.2]
-y = [0.2]
-z = { start = 1.0, stop = 2.0, count = 2 }
-z0 = [1.7]
-[trajectory]
-from = { rest = true }
-"""
 ROBOT = 'name = "mine"\nmass = 2.5\nbase_points = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n'
 # Words of the library that checks files, and of Python.
 FOREIGN = re.compile(r"\bvalid\b|Input|instance|dictionary|should|boolean|tuple|pydantic|~|datetime|None|True|False")

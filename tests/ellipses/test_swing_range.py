@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from support.commands import cspr
+from support.commands import refuse_sweep, swept
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -37,10 +37,7 @@ def text(**changes):
 
 def mapped(folder, **changes):
     folder.mkdir()
-    (folder / "s.toml").write_text(text(**changes))
-    code, _, err = cspr("run", folder / "s.toml", "-o", folder / "run")
-    assert (code, err) == (0, ""), err
-    return cspr_jax.open_result(folder / "run" / "s.h5")
+    return swept(folder, text(**changes))
 
 
 @pytest.fixture(scope="module")
@@ -296,9 +293,7 @@ def test_two_cables_in_a_plane_and_four_in_space(tmp_path):
     ],
 )
 def test_one_line_says_what_is_wrong(tmp_path, changes, words):
-    (tmp_path / "s.toml").write_text(text(**changes))
-    code, out, err = cspr("run", tmp_path / "s.toml", "-o", tmp_path / "run")
-    assert (code, out, err.count("\n")) == (2, "", 1) and words in err, err
+    refuse_sweep(tmp_path, text(**changes), words)
 
 
 def test_numbers_that_contradict_each_other_are_noticed(tmp_path):

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 from oracles import lines as oracle
-from support.commands import cspr, plan, planned
+from support.commands import cspr, plan, planned, refuse_sweep
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -239,10 +239,7 @@ def test_the_map_is_plans(tmp_path):
     ],
 )
 def test_bad_sweeps(tmp_path, old, new, words):
-    path = tmp_path / "s.toml"
-    path.write_text(SWEEP.replace(old, new, 1), "utf-8")
-    code, out, err = cspr("run", path, "-o", tmp_path / "out")
-    assert (code, out) == (2, "") and words in err and err.count("\n") == 1 and not (tmp_path / "out").exists()
+    refuse_sweep(tmp_path, SWEEP.replace(old, new, 1), words)
 
 
 def test_from_python():

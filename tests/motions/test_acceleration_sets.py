@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 from scipy.optimize import linprog
-from support.commands import cspr
+from support.commands import cspr, refuse_sweep
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -330,7 +330,4 @@ def test_wrench_closure():
     ],
 )
 def test_bad_sweeps(tmp_path, old, new, words):
-    path = tmp_path / "s.toml"
-    path.write_text(SWEEP.replace(old, new, 1), "utf-8")
-    code, out, err = cspr("run", path, "-o", tmp_path / "out")
-    assert (code, out) == (2, "") and words in err and err.count("\n") == 1 and not (tmp_path / "out").exists()
+    refuse_sweep(tmp_path, SWEEP.replace(old, new, 1), words)

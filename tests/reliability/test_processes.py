@@ -78,7 +78,7 @@ def test_kills_all(job, tmp_path):
     kills(job, tmp_path, 200)
 
 
-def waypoints(job, tmp_path, count):
+def stops(job, tmp_path, count):
     """Ctrl-C, SIGTERM, and Ctrl-C twice: the tile in progress is kept, and the code says what happened."""
     sweep, reference = job
     rng = np.random.default_rng(4)
@@ -104,12 +104,12 @@ def waypoints(job, tmp_path, count):
 
 
 def test_stop_signals(job, tmp_path):
-    waypoints(job, tmp_path, 3)
+    stops(job, tmp_path, 3)
 
 
 @pytest.mark.soak
 def test_stop_signals_all(job, tmp_path):
-    waypoints(job, tmp_path, 100)
+    stops(job, tmp_path, 100)
 
 
 def second_writers(job, tmp_path, count):

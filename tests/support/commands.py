@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from cspr_jax.cli import main
+from cspr_jax.store.reading.result import open_result
 
 
 def cspr(*arguments: object) -> tuple[int, str, str]:
@@ -37,3 +38,19 @@ def planned(folder: Path, text: str, code: int = 0) -> dict:
     found, out, err = plan(folder, text, "--json")
     assert (found, err) == (code, "")
     return strict_json(out)
+
+
+def swept(folder: Path, text: str):
+    """The result of a sweep, which runs in the folder."""
+    (folder / "s.toml").write_text(text, "utf-8")
+    code, _, err = cspr("run", folder / "s.toml", "-o", folder / "run")
+    assert (code, err) == (0, ""), err
+    return open_result(folder / "run" / "s.h5")
+
+
+def refuse_sweep(folder: Path, text: str, words: str) -> None:
+    """A sweep that is refused in one line that holds some words: nothing is written."""
+    (folder / "wrong.toml").write_text(text, "utf-8")
+    code, out, err = cspr("run", folder / "wrong.toml", "-o", folder / "run")
+    assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
+    assert not (folder / "run").exists()

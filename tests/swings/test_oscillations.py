@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 from conftest import equilateral
-from support.commands import cspr
+from support.commands import cspr, refuse_sweep
 
 from cspr_jax.families.swings.transitions.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.motion.amplitudes import named
@@ -168,10 +168,7 @@ def test_a_sweep_with_the_best_inclination(tmp_path):
 )
 def test_mistakes(tmp_path, change, words):
     assert change[0] in SWEEP
-    (tmp_path / "wrong.toml").write_text(SWEEP.replace(*change))
-    code, _, err = cspr("run", tmp_path / "wrong.toml", "-o", tmp_path / "run")
-    assert code == 2 and words in err and len(err.splitlines()) == 1
-    assert not (tmp_path / "run").exists()
+    refuse_sweep(tmp_path, SWEEP.replace(*change), words)
 
 
 def test_the_ideal_function_bounds_horizontal_transitions():

@@ -10,7 +10,7 @@ import pytest
 from oracles import clearance as oracle
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
-from support.commands import cspr
+from support.commands import cspr, refuse_sweep
 
 import cspr_jax
 from cspr_jax.robots.cables import with_cables
@@ -449,7 +449,7 @@ def test_what_nobody_asks_changes_no_identity():
     ],
 )
 def test_mistakes_are_one_line(tmp_path, changes, words):
-    refused(tmp_path, file_of(**changes), words)
+    refuse_sweep(tmp_path, file_of(**changes), words)
 
 
 @pytest.mark.parametrize(
@@ -470,11 +470,4 @@ def test_mistakes_of_other_robots(tmp_path, robot, lines, words):
     asked = lines if "conditions" in lines else f'conditions = ["interference-free"]\n{lines}'
     limits = "[limits]\ncable_speed_max = 1.0" if "speed" in lines else ""
     text = f'schema = 1\nmap = "workspace"\nrobot = "{robot}"\n[axes]\nx = [0]\ny = [0]\nz = [1]\n[workspace]\n'
-    refused(tmp_path, f"{text}{asked}\n{limits}\n", words)
-
-
-def refused(folder, text, words):
-    (folder / "w.toml").write_text(text)
-    code, out, error = cspr("run", folder / "w.toml", "-o", folder / "run")
-    assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
-    assert not (folder / "run").exists()
+    refuse_sweep(tmp_path, f"{text}{asked}\n{limits}\n", words)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
-from support.commands import cspr
+from support.commands import cspr, refuse_sweep
 from support.pairs import made, random_pairs
 
 import cspr_jax
@@ -221,9 +221,7 @@ def test_a_map_of_places_of_the_origin(tmp_path, z_axis):
     [("boralugoda-rectangle", [0.1], "4 points: must be 3 in this map"), ("transition-planar", [0.1], "axes.y")],
 )
 def test_sweeps_that_are_refused(tmp_path, robot, y, words):
-    (tmp_path / "s.toml").write_text(SWEEP.format(robot=robot, y=y, z=0.5, deeper=0.9))
-    code, _, err = cspr("run", tmp_path / "s.toml", "-o", tmp_path / "run")
-    assert code == 2 and words in err and len(err.splitlines()) == 1
+    refuse_sweep(tmp_path, SWEEP.format(robot=robot, y=y, z=0.5, deeper=0.9), words)
 
 
 def test_numbers_that_contradict_each_other_are_noticed(tmp_path):
