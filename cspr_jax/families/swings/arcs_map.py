@@ -26,7 +26,7 @@ class MinimumArcsMap(PointMassMap):
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse a planar robot, and build what all tiles use."""
         if robot_file.is_planar:
-            raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
+            raise ConfigError(file, f'robot "{robot_file.name}" is planar: must be one that moves in space in this map')
         super().__init__(robot_file, sweep_file, file)
         self._scene = self._scene_or_none(robot_file)
 
