@@ -28,7 +28,9 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.reference_pose import aligned
 
-TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
+TRAJECTORIES = 65_536
+SAMPLES = 128
+LANES = 2048
 NUMPY_TRAJECTORIES = 128
 FEWEST_ARCS, MAX_ARCS = 4, 15
 TARGET = (1.5 * 0.86, 0.0, 1.7)

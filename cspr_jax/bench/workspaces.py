@@ -27,7 +27,9 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 # Number of batches of poses, and of poses with twelve cables.
 BATCHES, FEW_BATCHES = 16, 4
 # Numbers of poses in one call: for distances of cables, for tensions, and for linear programs and least squares.
-PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
+PAIRS_BATCH = 65_536
+TENSIONS = 65_536
+SAMPLE = 100
 
 
 class SamplePoses(NamedTuple):

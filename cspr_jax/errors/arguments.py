@@ -21,7 +21,9 @@ Rule = Callable[[str, Any], None]
 
 LARGEST_LENGTH = 1e6  # m
 LARGEST_TIME = 1e12  # s; powers of times must not overflow
-LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
+LARGEST_POPULATION = 4096
+LARGEST_DIVISIONS = 128
+LARGEST_SAMPLES = 1_000_000
 UNBOUNDED = 10**9  # maximum of numbers that the function itself bounds more narrowly
 
 

@@ -7,7 +7,9 @@ from typing import Any
 
 from cspr_jax.runtime import terminal
 
-MISMATCH, UNKNOWN, NOTHING = "!=", "?", "none"
+MISMATCH = "!="
+UNKNOWN = "?"
+NOTHING = "none"
 LEGEND = (
     f"Each cell: published / computed, with as many digits as printed. {MISMATCH}: they differ by more than the "
     f"rounding of these digits. {UNKNOWN}: not printed, or not known. {NOTHING}: no feasible number was found."

@@ -27,8 +27,12 @@ SIGNS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
 BASE = np.concatenate([np.c_[SIGNS * [2.0, 1.5], np.full(4, z)] for z in (0.0, 2.0)])
 PLATFORM = np.tile(np.c_[SIGNS * 0.06, np.zeros(4)], (2, 1))
 LOW, HIGH = np.full(8, 1.0), np.full(8, 10.0)
-CENTRE, LONGEST, CLOSE = np.array([0.0, 0.0, 1.0]), 12.0, 1e-4
-DIVISIONS, FINE, BATCH = 3, 6, 2048
+CENTRE = np.array([0.0, 0.0, 1.0])
+LONGEST = 12.0
+CLOSE = 1e-4
+DIVISIONS = 3
+FINE = 6
+BATCH = 2048
 VARIANT = "WireX's hulls of IPAnema1Design"
 # Rounded; WireX prints 5.731436529861277 and 17.789244457956457.
 PUBLISHED = {("closed form", "volume, m3", VARIANT): "5.7314365", ("closed form", "surface, m2", VARIANT): "17.7892445"}

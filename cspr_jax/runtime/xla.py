@@ -32,7 +32,9 @@ PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
 # glibc gives each thread an arena of its own, and XLA has many threads: memory that one frees, the others cannot use.
 # With four arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The
 # last number is M_ARENA_MAX of malloc.h.
-ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
+ARENAS = "MALLOC_ARENA_MAX"
+_FEW = 4
+_ARENA_MAX = -8
 _LONGEST_REASON = 200
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 # Events of jax: it has lowered a function, which it then compiles; and it has compiled the function.

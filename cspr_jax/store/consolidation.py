@@ -24,7 +24,9 @@ from cspr_jax.store.files.netcdf import UNREADABLE, make_datasets, open_hdf5, pl
 from cspr_jax.store.files.publishing import new_file
 from cspr_jax.store.shards import Layout, Shard, digest_of
 
-LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_000
+LARGEST_TILE_BYTES = 1 << 24
+LARGEST_AXIS_BYTES = 1 << 28
+LARGEST_TILES = 100_000
 
 
 @dataclasses.dataclass(frozen=True)

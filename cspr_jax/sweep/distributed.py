@@ -21,8 +21,10 @@ from cspr_jax.sweep.tile import compute_tile
 from cspr_jax.sweep.work import Computed
 
 SECONDS_TO_CONNECT = 20
-# Times, s, after which a scheduler is given up that cannot be reached, that refuses connections, or that was lost.
-SECONDS_TO_REACH, SECONDS_FOR_REFUSAL, SECONDS_LOST = 3.5, 1.0, 3.0
+# Times after which a scheduler is given up.
+SECONDS_TO_REACH = 3.5  # that cannot be reached
+SECONDS_FOR_REFUSAL = 1.0  # that refuses connections
+SECONDS_LOST = 3.0  # that was lost
 # Workers may wait in a cluster's queue: times, s, after which the user is told, and after which the run gives up.
 SECONDS_FOR_WORKERS = (5, 900)
 # Interval of checks for a request to stop, s.

@@ -16,7 +16,9 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 
-STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
+STATIC = "static"
+CLOSURE = "wrench-closure"
+FEASIBLE = "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
 # Largest number of choices of dof - 1 cables, with which a pose takes seconds, and megabytes of memory.
 MAX_CHOICES = 100_000

@@ -39,6 +39,8 @@ def test_windows_are_checked_as_the_whole(table):
         assert check.to_dict()[key] == whole.to_dict()[key] in ("cubic", "rest")
     for name in ("tension_max", "cable_length_max", "cable_speed_max"):
         assert check.to_dict()[name] == pytest.approx(whole.to_dict()[name], rel=1e-3)
+    margins = [each.plan.demands.tension_margin[0] for each in (check, whole)]
+    assert margins[0] == pytest.approx(margins[1], rel=0.02)
     time = check.cause[0]["t"]
     assert any(start <= time <= end for start, end in check.failing) and abs(time - whole.cause[0]["t"]) < 0.1
     assert check.cause[0]["needed"] == pytest.approx(whole.cause[0]["needed"], rel=5e-3)

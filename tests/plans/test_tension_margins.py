@@ -14,7 +14,7 @@ def segment_of(**keys):
     return cspr_jax.plan(SWING | keys).to_dict()["segments"][0]
 
 
-@pytest.mark.parametrize("limits", [{}, {"tension_min": 0.02}, {"tension_max": 1.4}, {"tension_min": 5.0}])
+@pytest.mark.parametrize("limits", [{}, {"tension_min": 0.02}, {"tension_max": 1.2}, {"tension_min": 5.0}])
 def test_margins_are_distances_from_limits(limits):
     """Of a swing whose verdict rests on fast bounds, and of one that is refused, with the general proof."""
     segment = segment_of(limits=limits)

@@ -17,7 +17,9 @@ SETTINGS |= {20.0: "units", 21.0: "units", 90.0: "distances", 91.0: "distances",
 SYSTEMS = {float(code) for code in range(54, 60)} | {59.1, 59.2, 59.3}
 # G words that move to positions that the machine knows, and the file does not.
 HOME = {28.0: "G28", 29.0: "G29", 30.0: "G30", 53.0: "G53"}
-DWELL, SHIFT, END_SHIFT = 4.0, 92.0, (92.1, 92.2)
+DWELL = 4.0
+SHIFT = 92.0
+END_SHIFT = (92.1, 92.2)
 # G words without effect on a path: compensations and modes off, tool lengths, path modes, returns of canned cycles.
 _SKIPPED = {8.0, 9.0, 10.0, 11.0, 15.0, 28.1, 30.1, 40.0, 43.0, 43.1, 43.4, 49.0, 50.0, 61.0, 61.1, 64.0, 69.0, 80.0}
 _SKIPPED |= {94.0, 96.0, 97.0, 98.0, 99.0}

@@ -33,7 +33,9 @@ WINDOW = 200_000  # number of rows of a window
 OVERLAP = 100
 # Quaternions whose norm is within UNIT of 1 count as unit ones; others from SHORTEST to LONGEST are normalised with a
 # note, and all others refused.
-UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
+UNIT = 1e-3
+SHORTEST = 0.5
+LONGEST = 2.0
 MEETING = 1e-6  # largest jump of positions or velocities where legs meet, as a fraction of their largest values
 
 EMPTY = (",", ";", "\t", " ")  # first characters of lines that may consist of separators alone

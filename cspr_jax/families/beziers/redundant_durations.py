@@ -29,7 +29,9 @@ from cspr_jax.schema.verdicts import Verdict
 BATCH, SAMPLES = 512, 65
 # Number of durations tried first, and the shortest and longest, over the time of a fall by the distance; they are in
 # geometric progression.
-TRIED, SHORTEST, LONGEST = 257, 1e-2, 100.0
+TRIED = 257
+SHORTEST = 1e-2
+LONGEST = 100.0
 FINER = 33  # durations of a finer search between the neighbours of the best one
 ROUNDS = 4  # largest number of finer searches
 # Ends of intervals are bisected to this fraction of a duration.

@@ -26,7 +26,9 @@ from cspr_jax.robots.model.platform import PlatformRobot
 
 # A piece is halved while it is farther than this from the path of the motion, m, while it turns by more than this
 # angle, rad, or while the ratio of the speeds at its ends is larger than this.
-CLOSE, TURN, RATIO = 1e-8, 0.1, 1.3
+CLOSE = 1e-8
+TURN = 0.1
+RATIO = 1.3
 HALVINGS = 32  # largest number of halvings
 BRIEF = 4e-6  # s; shorter pieces are not halved, since rounding affects their second derivatives too much
 PIECES, FEWEST = 48, 4  # number of pieces of a section at first, and smallest number in each smooth part

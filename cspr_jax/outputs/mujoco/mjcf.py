@@ -28,7 +28,11 @@ from cspr_jax.store.files.publishing import publish
 _EXITS = jax.jit(jax.vmap(exits, in_axes=(None, None, None, 0)))
 KEYFRAME = "start"
 # Sizes of what is drawn, over the diagonal of the box around spools and path.
-MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
+MASS_RADIUS = 0.012
+SPOOL_RADIUS = 0.006
+POINT_RADIUS = 0.004
+CABLE_RADIUS = 0.002
+ROD_RADIUS = 0.003
 THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
 # Numbers for pulleys:
 LEAD = 0.5  # length of cable below the entry point, over the radius
@@ -38,8 +42,12 @@ FOLLOWING = 0.1  # distance of the points that keep a pulley in the plane of its
 SMALLEST_GAP = 0.01  # rad, between start and end of a tendon around a pulley
 LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # quaternion of the rotation from z to -y
 CLEAR = (0.0, 0.0, 0.0, 0.0)
-DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
-BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform_hull"
+DARK = (0.2, 0.2, 0.2, 1.0)
+BLUE = (0.1, 0.3, 0.6, 1.0)
+ORANGE = (0.85, 0.45, 0.1, 1.0)
+BROWN = (0.36, 0.24, 0.18, 0.6)
+GLASS = (0.85, 0.45, 0.1, 0.35)
+HULL = "platform_hull"
 
 
 def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:

@@ -29,7 +29,9 @@ from cspr_jax.robots.model.state import State
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
-SPATIAL, PLANAR, GUIDED = 3, 2, 1
+SPATIAL = 3
+PLANAR = 2
+GUIDED = 1
 LARGEST_LENGTH = 1e6  # m; products of larger lengths could overflow or lose digits
 # Spools closer to a plane than this, over their spread, lie in it.
 IN_PLANE = 1e-9

@@ -38,7 +38,9 @@ from cspr_jax.store.shards import Layout, decode, header_of
 # file: usually a few, but many if all are equal.
 LARGEST_DATA, DENSEST = 8e9, 50
 # Processor time, s, for inspecting a file, and for reading each byte and each chunk, on a slow machine.
-_INSPECTION_SECONDS, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
+_INSPECTION_SECONDS = 1.0
+_PER_BYTE = 1.0 / 25e6
+_PER_CHUNK = 1e-4
 _MEMORY = 256 << 20
 # Datasets with names of parts of vectors, which serve other programs.
 _PART_NAMES = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")

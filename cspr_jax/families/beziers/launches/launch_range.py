@@ -32,7 +32,9 @@ from cspr_jax.schema.verdicts import FLAGS
 UNKNOWNS, POPULATION = 6, 64
 # Margins that the launch of least speed must keep in the search. Those of taut cables are exact; those of limits are
 # only sampled in the search and proved later, so they are larger.
-EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
+EXACT = (1e-6,)
+SAMPLED = (1e-3, 1e-2)
+SAMPLES = 33
 # Number of landing points whose answers are computed at a time.
 TOGETHER = 512
 

@@ -20,7 +20,9 @@ from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
 from cspr_jax.numerics.shapes import Bool, Float
 
 # Weight of the barriers at the start and at the end; it falls to the smaller of a fraction and a power of itself.
-BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
+BARRIERS = (1e-1, 3e-8)
+BARRIER_FALL = 0.2
+BARRIER_POWER = 1.5
 # Softness of the equations at the start and at the end, and the factor by which it falls.
 SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
 CLOSE = 10.0  # the weight of the barriers falls once errors of Newton's equations are below this multiple

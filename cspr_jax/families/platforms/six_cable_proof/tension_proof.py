@@ -44,7 +44,9 @@ from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
 # Numbers of blocks of an arc at first, from rest and between poses, where orientations turn faster. If margins are
 # refined from the samples of blocks, the number is fixed; for verdicts alone it grows from the first to the second
 # number with the amplitude, see `blocks.growing`.
-WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
+WITH_MARGINS = (3, 6)
+FROM_REST = (1.0, 5.0)
+BETWEEN = (6.0, 6.0)
 # Number of orders of the cables that are tried while rounding keeps a block open.
 ORDERS = 6
 MATTERS = 0.1  # rounding matters above this fraction of the total allowance

@@ -13,7 +13,9 @@ from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
 
 # Number of pictures from which colours are taken; number of colours that are kept exactly, such as white and greys,
 # which cover most of a picture; and number of all colours.
-SAMPLES, EXACT, COLOURS = 8, 32, 256
+SAMPLES = 8
+EXACT = 32
+COLOURS = 256
 
 
 class GifWriter(AbstractMovieWriter):

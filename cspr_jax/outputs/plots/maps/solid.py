@@ -26,10 +26,16 @@ from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.reading.result import Result
 
 SPACE = ["x", "y", "z"]
-SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
+SURFACE = COLOURS[5]
+END = "#9a9a9a"
+LINES = COLOURS[0]
+CABLES = COLOURS[1]
 BACK, FRONT = 0.4, 0.3  # opacities
 # Inches: width of the box, height of title and legend, and smallest and largest height of the picture.
-ACROSS, BESIDE, LOW, HIGH = 6.8, 1.3, 3.6, 7.6
+ACROSS = 6.8
+BESIDE = 1.3
+LOW = 3.6
+HIGH = 7.6
 
 
 class _Eye(NamedTuple):

@@ -27,7 +27,9 @@ SEGMENTS = 8
 # Inches: height of a line of the table, on a page and in a column; width of the robot, and its smallest and largest
 # height.
 LINE, NARROW_LINE = 0.28, 0.44
-ACROSS, LOW, HIGH = 6.6, 3.0, 6.4
+ACROSS = 6.6
+LOW = 3.0
+HIGH = 6.4
 HEADS = ("segment", "arcs", "duration (s)", "margin (N)", "verdict")
 # Widths of the table's columns as fractions, and number of letters of a line of the verdict, on a page and in a column.
 WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)

@@ -28,7 +28,10 @@ from cspr_jax.store.reading.result import Result
 # Largest number of times at which the robot is drawn, among those where segments begin and end.
 SHOWN = 6
 # Inches: width of the robot, height of texts above and below it, and smallest and largest height of the picture.
-ACROSS, BESIDE, LOW, HIGH = 6.6, 1.9, 3.9, 7.6
+ACROSS = 6.6
+BESIDE = 1.9
+LOW = 3.9
+HIGH = 7.6
 # Spools closer together than this fraction of the largest distance share a label.
 TOGETHER = 0.08
 

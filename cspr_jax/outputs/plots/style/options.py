@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 # Names that `--quantity` takes for motions.
-ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
+ACCELERATION = "acceleration"
+PATH_ACCELERATION = "path_acceleration"
+LANDING = "landing"
 PHASE_PLANE = "phase_plane"
-TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
+TRAJECTORY = "trajectory"
+TENSIONS = "tensions"
+SUMMARY = "summary"
 # Widths of pictures for papers, cm: common ones, and those of publishers.
 USUAL = "usual"
 WIDTHS = {

@@ -41,7 +41,9 @@ RC_PARAMS = {
 }
 # No dates and versions in the files.
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
+SIDES = (4.0, 120.0)
+DPIS = (30.0, 1200.0)
+FONT_SIZES = (4.0, 40.0)
 # Font sizes of pictures for papers, points; the heights of such pictures follow from their content.
 PRESETS = {"column": 8.0, "page": 9.0}
 UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
