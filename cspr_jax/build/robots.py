@@ -79,7 +79,9 @@ def build_robot(robot_file: RobotFile, spec: TrajectoryKeys, file: object) -> Po
 
 
 def _of_cables(robot_file: RobotFile) -> dict[str, Any]:
-    return {name: getattr(robot_file, name) for name in ("cable_diameter", "pulley_radius", "pulley_axes")}
+    names = ("cable_diameter", "pulley_radius", "pulley_axes", "axial_stiffness")
+    winch = robot_file.winch
+    return {name: getattr(robot_file, name) for name in names} | {"winch": None if winch is None else dict(winch)}
 
 
 @overload

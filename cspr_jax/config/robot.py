@@ -15,10 +15,12 @@ from cspr_jax.config.keys.limits import (
     LimitKeys,
     MatrixRow,
     NotNegativePerCable,
+    PerCable,
     PerCableDirection,
     Point,
     Positive,
 )
+from cspr_jax.config.keys.winch import WinchTable
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, demand, shown
@@ -86,6 +88,12 @@ class RobotFile(LimitKeys):
         description="axes about which pulleys swivel, in the direction in which the cables enter them: one vector "
         "[x, y, z], or one per cable (default: straight up)",
     )
+    axial_stiffness: PerCable | None = Field(
+        None,
+        description="axial stiffness EA of the cables, the tension that would double a length, one number, or one per "
+        "cable, N; absent: cables do not stretch",
+    )
+    winch: WinchTable | None = Field(None, description="winches of the cables")
     _notes: tuple[str, ...] = PrivateAttr(())  # about items of a file of another program
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
 
@@ -173,7 +181,11 @@ class RobotFile(LimitKeys):
         if self.pulley_radius is not None:
             raise InputError("pulley_radius", None, "absent", problem="its cables leave from pulleys")
         points = np.asarray(self.platform_points) - np.asarray(self.centre_of_mass or [0.0, 0.0, 0.0])
-        return parallel_pairs(self.base_points, points)
+        pairs = parallel_pairs(self.base_points, points)
+        if self.winch is not None and (name := self.winch.first_difference(pairs.cables.tolist())):
+            problem = "cables of a pair are on one winch, but their numbers differ"
+            raise InputError(f"winch.{name}", None, "equal for both", problem=problem)
+        return pairs
 
     @property
     def as_written(self) -> "RobotFile":
@@ -192,10 +204,15 @@ class RobotFile(LimitKeys):
 
     def equivalent(self) -> "RobotFile":
         """The point mass on three cables to which this platform on six cables in parallel pairs is equivalent."""
-        exits = self.parallel_pairs().exit_points.tolist()
+        pairs = self.parallel_pairs()
         others = ("inertia", "centre_of_mass", "pattern", "translation_only")
-        absent = dict.fromkeys(("platform_points", *others))
-        robot_file = self.model_copy(update={"base_points": exits, **absent})
+        changes: dict[str, Any] = dict.fromkeys(("platform_points", *others))
+        if self.axial_stiffness is not None:  # parallel cables of one length: their stiffnesses add up
+            each = np.broadcast_to(np.asarray(self.axial_stiffness, float), (len(self.base_points),))
+            changes["axial_stiffness"] = each[pairs.cables].sum(1).tolist()
+        if self.winch is not None:
+            changes["winch"] = self.winch.of_cables(pairs.cables[:, 0].tolist())
+        robot_file = self.model_copy(update={"base_points": pairs.exit_points.tolist(), **changes})
         robot_file._platform = self.model_copy(update={"translation_only": True})
         return robot_file
 
@@ -212,6 +229,13 @@ class RobotFile(LimitKeys):
             raise table_error("pulley_axes", axes, "absent without pulley_radius")
         if axes is not None and isinstance(axes[0], list) and len(axes) != count:
             raise table_error("pulley_axes", f"{len(axes)} vectors", f"one vector, or {count}: one a cable")
+        stiffness = self.axial_stiffness
+        if isinstance(stiffness, list) and len(stiffness) != count:
+            raise table_error("axial_stiffness", stiffness, f"a number > 0, or {count}: one a cable")
+        if self.winch is not None:
+            self.winch.check_count(count)
+            if self.winch.has_layers and not self.cable_diameter:
+                raise table_error("cable_diameter", self.cable_diameter, "a number > 0 beside winch.layer_turns, m")
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:

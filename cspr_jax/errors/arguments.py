@@ -206,6 +206,8 @@ QuaternionsOfPaths = Annotated[np.ndarray | Sequence[Any], Kind("arrays (k, 4)",
 Coordinates3 = Annotated[ArrayLike, Numbers("three coordinates, at most 1e6 m", ((3,),), **LENGTHS)]
 Axes = Annotated[ArrayLike, Numbers("a vector [x, y, z], or one a cable", ((3,), (ANY, 3)))]
 Radii = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one a cable", ((), (ANY,)))]
+Winch = Annotated[Mapping[str, Any], Kind("numbers by the keys of [winch] in robot files", (Mapping,))]
+Stiffnesses = Annotated[ArrayLike, Numbers("a number > 0, in N, or one a cable", ((), (ANY,)), positive=True)]
 Inertia = Annotated[ArrayLike, Numbers("three rows of three finite numbers, kg m^2", ((3, 3),))]
 ReleaseRange = Annotated[
     Sequence[float] | None, Choice(Numbers("[least, largest], at most 1e6 m", ((2,),), **LENGTHS), (None,))

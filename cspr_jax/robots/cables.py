@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.errors.arguments import Axes, Diameter, Radii
+from cspr_jax.errors.arguments import Axes, Diameter, Radii, Stiffnesses, Winch
 from cspr_jax.numerics.elementary import as_float64, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -23,6 +23,7 @@ from cspr_jax.robots.model.pulleys import pulleys_of
 from cspr_jax.robots.model.robot import MOVED
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.robots.model.winches import winches_of
 from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import Distribution
@@ -38,19 +39,24 @@ def with_cables(
     cable_diameter: Diameter | None = None,
     pulley_radius: Radii | None = None,
     pulley_axes: Axes | None = None,
+    axial_stiffness: Stiffnesses | None = None,
+    winch: Winch | None = None,
 ) -> RobotKind:
-    """A robot with thick cables, or pulleys.
+    """A robot with thick or elastic cables, pulleys, or winches.
 
     Args:
         cable_diameter: diameter of the cables, m; None: 0.
         pulley_radius: () or (n_cables,) radii of the pulleys, m; None: no pulleys.
         pulley_axes: (3,) or (n_cables, 3) swivel axes, in the direction in which the cables enter; None: straight up.
+        axial_stiffness: () or (n_cables,) axial stiffness EA of the cables, N; None: they do not stretch.
+        winch: numbers of the winches, one for all or one per cable, by the keys of [winch] in robot files; None: not
+            known.
 
     Returns:
         the robot.
 
     Raises:
-        InputError: an impossible diameter, or impossible pulleys.
+        InputError: an impossible diameter or stiffness, or impossible pulleys or winches.
     """
     changes: dict[str, Any] = {}
     if cable_diameter is not None:
@@ -64,6 +70,14 @@ def with_cables(
         changes["pulleys"] = pulleys
     elif pulley_axes is not None:
         raise InputError("pulley_axes", pulley_axes, "absent without pulley_radius")
+    if axial_stiffness is not None:
+        stiffness, allowed = np.asarray(axial_stiffness, float), f"a number > 0, in N, or {robot.n_cables}: one a cable"
+        if stiffness.shape not in ((), (robot.n_cables,)) or not ((stiffness > 0.0) & np.isfinite(stiffness)).all():
+            raise InputError("axial_stiffness", axial_stiffness, allowed)
+        changes["axial_stiffness"] = as_float64(np.broadcast_to(stiffness, (robot.n_cables,)))
+    if winch is not None:
+        diameter = robot.cable_diameter if cable_diameter is None else cable_diameter
+        changes["winches"] = winches_of(winch, robot.n_cables, diameter, "winch.")
     return dataclasses.replace(robot, **changes) if changes else robot
 
 

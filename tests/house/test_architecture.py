@@ -23,6 +23,7 @@ FLOORS = (
     ("launch", "maps", "curves"),
     ("workspaces",),
     ("families",),
+    ("machine",),
     ("plans", "sweep", "bench"),
     ("outputs",),
     ("published", "outputs.plots"),
@@ -45,9 +46,10 @@ KERNELS = (
     "curves",
     "workspaces",
     "families",
+    "machine",
 )
 # What a folder is about, what it rests on, and its files in the order in which they are read, stand in its guide.
-GUIDES = ("motion", "verification", "launch", "curves", "workspaces", *FAMILIES)
+GUIDES = ("motion", "verification", "launch", "curves", "workspaces", "machine", *FAMILIES)
 # Tables of rows: to split one hides rows and shortens nothing. They may have more than 400 lines.
 TABLES = ("schema.map_kinds", "schema.quantities")
 LARGEST_FOLDER = 16

@@ -74,17 +74,18 @@ def _variant_of_vectors(value: Any) -> str:
     return "~each" if isinstance(value, list) and value and isinstance(value[0], list) else "~one"
 
 
-def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
+def one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
+    """Type of one value for all cables, or of a list with one per cable."""
     many = Annotated[list[each], Field(min_length=1, max_length=MAX_CABLES), Tag("~each")]
     return Annotated[Annotated[one, Tag("~one")] | many, Discriminator(variant)]
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
 # A function makes these types, which mypy cannot check: they are Any.
-PerCable: Any = _one_or_each(Positive, Positive)
-NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
-TensionPerCable: Any = _one_or_each(Positive, Bound)
-PerCableDirection: Any = _one_or_each(Direction, Direction, _variant_of_vectors)
+PerCable: Any = one_or_each(Positive, Positive)
+NotNegativePerCable: Any = one_or_each(NotNegative, NotNegative)
+TensionPerCable: Any = one_or_each(Positive, Bound)
+PerCableDirection: Any = one_or_each(Direction, Direction, _variant_of_vectors)
 
 
 def _limit_keys(*, per_cable: bool) -> dict[str, Any]:

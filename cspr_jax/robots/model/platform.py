@@ -32,6 +32,7 @@ from cspr_jax.robots.model.point_mass import (
 )
 from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winches import Winches
 
 RIGID = "3R3T"
 
@@ -57,6 +58,8 @@ class PlatformRobot:
         centre_of_mass: (3,) mass centre from the origin of the platform frame, platform axes, m; None: at the origin.
         pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
+        axial_stiffness: (n_cables,) EA of the cables, N; None: they do not stretch.
+        winches: winches of the cables; None: not known.
     """
 
     base_points: Array
@@ -72,6 +75,8 @@ class PlatformRobot:
     centre_of_mass: Array | None = None
     pulleys: Pulleys | None = None
     cable_diameter: Array | None = None
+    axial_stiffness: Array | None = None
+    winches: Winches | None = None
 
     @property
     def dof(self) -> int:
@@ -110,7 +115,7 @@ jax.tree_util.register_dataclass(
     PlatformRobot,
     [
         *("base_points", "platform_points", "mass", "inertia", "gravity", "limits", "centre_of_mass", "pulleys"),
-        "cable_diameter",
+        *("cable_diameter", "axial_stiffness", "winches"),
     ],
     ["joints", "z_axis", "pattern"],
     drop_fields=["name"],

@@ -26,6 +26,7 @@ from cspr_jax.robots.model.robot import Robot
 from cspr_jax.robots.model.spool_plane import AT_P0 as AT_P0
 from cspr_jax.robots.model.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical, spread
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winches import Winches
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
@@ -56,6 +57,8 @@ class PointMassRobot:
         dof: degrees of freedom: 3 in space, 2 in the plane y = 0, 1 on a guide; static in compiled functions.
         pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
+        axial_stiffness: (n_cables,) EA of the cables, N; None: they do not stretch.
+        winches: winches of the cables; None: not known.
     """
 
     base_points: Array
@@ -67,6 +70,8 @@ class PointMassRobot:
     dof: int = SPATIAL
     pulleys: Pulleys | None = None
     cable_diameter: Array | None = None
+    axial_stiffness: Array | None = None
+    winches: Winches | None = None
 
     @property
     def pattern(self) -> str:
@@ -95,7 +100,7 @@ class PointMassRobot:
 # The name is no field of the pytree, so that functions are not compiled again for robots of other names.
 jax.tree_util.register_dataclass(
     PointMassRobot,
-    ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter"],
+    ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter", "axial_stiffness", "winches"],
     ["z_axis", "dof"],
     drop_fields=["name"],
 )

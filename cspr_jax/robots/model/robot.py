@@ -8,6 +8,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winches import Winches
 
 
 class Robot(Protocol):
@@ -51,6 +52,14 @@ class Robot(Protocol):
     @property
     def cable_diameter(self) -> Array | None:
         """Diameter of the cables, (), m; None: 0."""
+
+    @property
+    def axial_stiffness(self) -> Array | None:
+        """Axial stiffness EA of the cables, (n_cables,), N; None: they do not stretch."""
+
+    @property
+    def winches(self) -> Winches | None:
+        """Winches of the cables; None: not known."""
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions.

@@ -1,0 +1,9 @@
+"""The machine: what drives the cables of a robot, from proved motions to motors, and back from measured lengths.
+
+Numbers of winches and elastic cables are part of the robot (`robots.model.winches`), and their limits are limits like
+all others (`schema.limits`). Sign conventions are those of `robots.model.winches`.
+
+Files, each importing only from those above it:
+
+    motors   motors of a robot in its states
+"""

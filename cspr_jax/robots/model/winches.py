@@ -1,0 +1,226 @@
+"""Winches: drums, gears and motors of the cables; angle, speed, torque and power of each motor.
+
+With the drum radius r, the gear ratio i and the length l of a cable, the drum winds with the speed -l' / r, and the
+motor with w = -i l' / r. Its torque, positive where it winds, follows from the balance of power: a tension f takes the
+power -f l', the rotor stores J w w', and friction takes the rest:
+
+    torque = r f / (i e^s) + J w' + s c + b w
+
+with the efficiency e, the Coulomb friction c, the viscous friction b, and s = 1 where the motor winds, -1 where it pays
+out. At standstill friction acts in either direction.
+
+A drum with layers: the cable on it grows its radius by one step a layer of a number of turns. The radius then depends
+on the length on the drum, in steps, and the angle is a broken line over the length.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.errors.given_numbers import numbers
+from cspr_jax.errors.suggestions import did_you_mean
+from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float
+from cspr_jax.schema.winches import TOGETHER, WINCH_NUMBERS, WinchNumber
+
+# A motor whose speed is below this one, in rad/s, stands still: friction may act in either direction.
+STANDSTILL = 1e-6
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Layers:
+    """Layers of cable on drums, (n_cables,) each.
+
+    Fields:
+        growth: growth of the radius from layer to layer, m.
+        turns: turns of a layer.
+        cable_length: length of the cable from its end on the drum, m: what is not paid out lies on the drum.
+    """
+
+    growth: Array
+    turns: Array
+    cable_length: Array
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Winches:
+    """Winches of a robot, (n_cables,) each.
+
+    Fields:
+        drum_radius: distance of the cable's centre line from the axis of the drum, in the first layer, m.
+        gear_ratio: turns of the motor for one turn of the drum.
+        motor_inertia: inertia of all that turns, as the motor sees it, kg m^2.
+        friction: Coulomb friction, as the motor sees it, N m.
+        viscous_friction: friction over speed, as the motor sees it, N m s/rad.
+        efficiency: power that reaches the cable over power of the motor while it winds.
+        zero_length: length of the cable at angle 0, m.
+        direction: 1 where a growing angle pays out, -1 where it winds.
+        layers: layers on the drums; None: the radius is constant.
+        stall_torque: torque at standstill of the line that falls to 0 at `no_load_speed`, N m; None: no line.
+        no_load_speed: speed at which that line has no torque, rad/s; None: no line.
+        encoder_counts: counts of an encoder for one turn of the motor; None: not known.
+    """
+
+    drum_radius: Array
+    gear_ratio: Array
+    motor_inertia: Array
+    friction: Array
+    viscous_friction: Array
+    efficiency: Array
+    zero_length: Array
+    direction: Array
+    layers: Layers | None = None
+    stall_torque: Array | None = None
+    no_load_speed: Array | None = None
+    encoder_counts: Array | None = None
+
+
+def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at: str = "") -> Winches:
+    """Winches of a robot, from the numbers of `schema.winches`, checked."""
+    names = [row.name for row in WINCH_NUMBERS]
+    for name in values:
+        if name not in names:
+            raise InputError(
+                f"{at}{name}", values[name], f"absent: {did_you_mean(name, names)}keys are {', '.join(names)}"
+            )
+    given: dict[str, Any] = {
+        row.name: value for row in WINCH_NUMBERS if (value := _number(row, values, n_cables, at)) is not None
+    }
+    for pair in TOGETHER:
+        if len(given.keys() & set(pair)) == 1:
+            missing, other = sorted(pair, key=lambda name: name in given)
+            raise InputError(f"{at}{missing}", None, f"given beside {other}", problem="missing")
+    turns, length = given.pop("layer_turns", None), given.pop("cable_length", None)
+    layers = None
+    if turns is not None and length is not None:
+        if not cable_diameter:
+            raise InputError("cable_diameter", cable_diameter, f"a number > 0 beside {at}layer_turns, in m")
+        growth = as_float64(np.broadcast_to(np.asarray(cable_diameter, float), (n_cables,)))
+        layers = Layers(growth, turns, length)
+    line: dict[str, Any] = {name: given.pop(f"motor_{name}", None) for name in ("stall_torque", "no_load_speed")}
+    return Winches(**given, **line, layers=layers)
+
+
+def _number(row: WinchNumber, values: Mapping[str, Any], n_cables: int, at: str) -> Array | None:
+    value = values.get(row.name)
+    value = row.default if value is None else value
+    if value is None:
+        if row.is_required:
+            raise InputError(f"{at}{row.name}", None, row.allowed, problem="missing")
+        return None
+    allowed = f"{row.allowed}, or {n_cables}: one a cable"
+    array = numbers(f"{at}{row.name}", value, allowed)
+    if array.shape not in ((), (n_cables,)) or not all(map(row.is_allowed, np.atleast_1d(array).tolist())):
+        raise InputError(f"{at}{row.name}", value, allowed)
+    return as_float64(np.broadcast_to(array, (n_cables,)))
+
+
+class MotorStates(NamedTuple):
+    """States of the motors, (n_cables,) each; positive where the angle grows.
+
+    Fields:
+        angle: rad.
+        speed: rad/s.
+        acceleration: rad/s^2.
+        torque: that holds the cables at these tensions while they move so; at standstill without friction, N m.
+        power: torque times speed, W: positive where the motor drives, negative where it brakes.
+    """
+
+    angle: Array
+    speed: Array
+    acceleration: Array
+    torque: Array
+    power: Array
+
+
+def radii(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Radii of the drums where the cables leave them."""
+    if winches.layers is None:
+        return jnp.broadcast_to(winches.drum_radius, lengths.shape)
+    return winches.drum_radius + winches.layers.growth * _full_layers(winches, winches.layers, lengths)
+
+
+def drum_angles(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Angles by which drums have paid out since `zero_length`, rad."""
+    if winches.layers is None:
+        return (lengths - winches.zero_length) / winches.drum_radius
+    return _turned(winches, winches.layers, winches.zero_length) - _turned(winches, winches.layers, lengths)
+
+
+def motor_angles(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Angles of the motors, rad."""
+    return winches.direction * winches.gear_ratio * drum_angles(winches, lengths)
+
+
+def cable_lengths(winches: Winches, angles: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Lengths of the cables at angles of the motors, m: the inverse of `motor_angles`."""
+    paid_out = angles / (winches.direction * winches.gear_ratio)
+    if winches.layers is None:
+        return winches.zero_length + winches.drum_radius * paid_out
+    layers, angle = winches.layers, _turned(winches, winches.layers, winches.zero_length) - paid_out
+    full = jnp.maximum(jnp.floor(angle / (2.0 * jnp.pi * layers.turns)), 0.0)
+    rest = (angle - 2.0 * jnp.pi * layers.turns * full) * (winches.drum_radius + layers.growth * full)
+    return layers.cable_length - _wound(winches, layers, full) - rest
+
+
+def torques(
+    winches: Winches,
+    radius: Float[Array, "n"],
+    speed: Float[Array, "n"],
+    acceleration: Float[Array, "n"],
+    tensions: Float[Array, "n"],
+    side: Float[Array, "n"],
+) -> Float[Array, "n"]:
+    """Torques that wind, N m, from winding speeds and accelerations; `side` is s of the equation above, or 0."""
+    load = radius * tensions / winches.gear_ratio
+    moved = winches.motor_inertia * acceleration + side * winches.friction + winches.viscous_friction * speed
+    return load * winches.efficiency ** -jnp.asarray(side) + moved
+
+
+def motor_states(
+    winches: Winches,
+    lengths: Float[Array, "n"],
+    rates: Float[Array, "n"],
+    accelerations: Float[Array, "n"],
+    tensions: Float[Array, "n"],
+) -> MotorStates:
+    """States of the motors that give cables these lengths, rates, accelerations and tensions."""
+    radius = radii(winches, lengths)
+    speed, acceleration = (-winches.gear_ratio * each / radius for each in (rates, accelerations))
+    side = jnp.where(jnp.abs(speed) <= STANDSTILL, 0.0, jnp.sign(speed))
+    torque = torques(winches, radius, speed, acceleration, tensions, side)
+    sign = -winches.direction
+    return MotorStates(motor_angles(winches, lengths), sign * speed, sign * acceleration, sign * torque, torque * speed)
+
+
+def _wound(winches: Winches, layers: Layers, full: Array) -> Array:
+    # Length of the cable in `full` layers, m.
+    return 2.0 * jnp.pi * layers.turns * full * (winches.drum_radius + 0.5 * layers.growth * (full - 1.0))
+
+
+def _full_layers(winches: Winches, layers: Layers, lengths: Array) -> Array:
+    # Largest whole number whose layers are not longer than what lies on the drum: the root of a quadratic.
+    turns = jnp.maximum(layers.cable_length - lengths, 0.0) / (2.0 * jnp.pi * layers.turns)
+    first = winches.drum_radius - 0.5 * layers.growth
+    root = jnp.floor(2.0 * turns / (first + jnp.sqrt(first**2 + 2.0 * layers.growth * turns)))
+    # Rounding may put a length at the end of a layer into the wrong one.
+    beyond = _wound(winches, layers, root + 1.0) <= layers.cable_length - lengths
+    short = _wound(winches, layers, root) > jnp.maximum(layers.cable_length - lengths, 0.0)
+    return root + jnp.where(beyond, 1.0, 0.0) - jnp.where(short, 1.0, 0.0)
+
+
+def _turned(winches: Winches, layers: Layers, lengths: Array) -> Array:
+    # Angle of the drum since it was empty, rad.
+    full = _full_layers(winches, layers, lengths)
+    rest = layers.cable_length - lengths - _wound(winches, layers, full)
+    return 2.0 * jnp.pi * layers.turns * full + rest / (winches.drum_radius + layers.growth * full)
