@@ -1,4 +1,4 @@
-"""Keys of winches in robot files: the rows of `schema.winches`; without jax."""
+"""Keys of winches in robot files: the rows of `robots.model.winch_numbers`; without jax."""
 
 from typing import Annotated, Any
 
@@ -7,7 +7,7 @@ from pydantic import Field, create_model, model_validator
 from cspr_jax.config.keys.limits import NotNegativePerCable, PerCable, one_or_each
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
-from cspr_jax.schema.winches import TOGETHER, WINCH_NUMBERS
+from cspr_jax.robots.model.winch_numbers import TOGETHER, WINCH_NUMBERS
 
 _Sign = Annotated[float, Field(ge=-1, le=1)]
 Signs: Any = one_or_each(_Sign, _Sign)
@@ -25,7 +25,7 @@ def _keys() -> dict[str, Any]:
     return fields
 
 
-# A base class whose fields are the rows of `schema.winches.WINCH_NUMBERS`; Any, since mypy does not know it.
+# A base class whose fields are the rows of `WINCH_NUMBERS`; Any, since mypy does not know it.
 _Numbers: Any = create_model("_Numbers", __base__=Table, **_keys())
 
 

@@ -29,7 +29,7 @@ from cspr_jax.errors.given_numbers import numbers
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
-from cspr_jax.schema.winches import TOGETHER, WINCH_NUMBERS, WinchNumber
+from cspr_jax.robots.model.winch_numbers import TOGETHER, WINCH_NUMBERS, WinchNumber
 
 # A motor whose speed is below this one, in rad/s, stands still: friction may act in either direction.
 STANDSTILL = 1e-6
@@ -86,7 +86,7 @@ class Winches:
 
 
 def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at: str = "") -> Winches:
-    """Winches of a robot, from the numbers of `schema.winches`, checked."""
+    """Winches of a robot, from the numbers of `robots.model.winch_numbers`, checked."""
     names = [row.name for row in WINCH_NUMBERS]
     for name in values:
         if name not in names:

@@ -1,4 +1,4 @@
-"""Numbers of winches: one row each. No jax here: files and tables use them too."""
+"""Numbers of winches: one row each. No jax here: files use them too."""
 
 import dataclasses
 
