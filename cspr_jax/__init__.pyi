@@ -1,6 +1,8 @@
 """The public names for type checkers and editors, as `__init__.py` loads them."""
 
 from cspr_jax.api.checks import check as check
+from cspr_jax.api.elasticity import natural_frequencies as natural_frequencies
+from cspr_jax.api.elasticity import stiffness as stiffness
 from cspr_jax.api.families.beziers import bezier as bezier
 from cspr_jax.api.families.beziers import bezier_durations as bezier_durations
 from cspr_jax.api.families.beziers import bezier_verdicts as bezier_verdicts

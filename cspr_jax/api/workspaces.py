@@ -94,7 +94,7 @@ def workspace(  # noqa: PLR0913
             accelerations of a robot on a joint, limits or wrenches for a condition without them, or contradictory
             limits.
     """
-    _check_kind(robot)
+    check_kind(robot)
     check_cables(robot)
     if condition not in CONDITIONS:
         raise InputError("condition", condition, one_of(condition, CONDITIONS))
@@ -113,12 +113,13 @@ def workspace(  # noqa: PLR0913
         loads = required_wrenches(
             centred_robot, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
-        inner, turns = _poses(centred_robot, frame, points, orientations, point or "origin")
+        inner, turns = kernel_poses(centred_robot, frame, points, orientations, point or "origin")
         posed = requirement(centred_robot, condition, limits, loads, capacity_length)
         return WorkspaceSearch(centred_robot, posed, precision=precision)(inner, turns)
 
 
-def _check_kind(robot) -> None:
+def check_kind(robot) -> None:
+    """Refuse what is no robot of this package."""
     if not isinstance(robot, PointMassRobot | PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
 
@@ -130,18 +131,18 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 
-def _poses(
-    robot, frame: Frame, positions: np.ndarray, orientations, point: str
+def kernel_poses(
+    robot, frame: Frame, positions: np.ndarray, orientations, point: str, key: str = "orientations"
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    # Return positions of the mass centre, (n, 3), and quaternions, (n, 4).
+    """Positions of the mass centre, (n, 3), and quaternions, (n, 4), in the kernels' axes."""
     row = PATTERNS[robot.pattern]
     inner, turns = np.asarray(frame.inward(positions)), None
     if orientations is not None:
         if not row.is_body:
-            raise InputError("orientations", None, "must be None", problem="a point mass has none")
-        unit_quaternions = quaternions("orientations", orientations, len(positions))
+            raise InputError(key, None, "must be None", problem="a point mass has none")
+        unit_quaternions = quaternions(key, orientations, len(positions))
         if row.is_planar and unit_quaternions[:, [1, 3]].any():
-            raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
+            raise InputError(key, "not about y", "turns about y: those of a planar robot")
         turns = frame.rotated_quaternions(unit_quaternions)
     return (mass_centres(robot, inner, turns) if point == "origin" else inner), turns
 
@@ -206,7 +207,7 @@ def sensitivity(
         InputError: more cables than degrees of freedom, pulleys, or another pattern of motion; shapes that do not fit,
             values that are not finite, quaternions that are not of unit length, or orientations of a point mass.
     """
-    _check_kind(robot)
+    check_kind(robot)
     points = points_of("positions", positions)
     check_in_plane("positions", points, is_planar=robot.dof == PLANAR)
     if orientations is not None and isinstance(robot, PointMassRobot):

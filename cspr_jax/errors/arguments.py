@@ -229,5 +229,12 @@ BetaHat = Annotated[
 Tensions = Annotated[
     ArrayLike | None, Choice(Numbers("a number in N, or one a cable", ((), (ANY,)), infinite=True), (None,))
 ]
+TensionsOfPoses = Annotated[
+    ArrayLike | None,
+    Choice(
+        Numbers("numbers > 0 of shape (), (n_cables,) or (n, n_cables), N", ((), (ANY,), (ANY, ANY)), positive=True),
+        (None,),
+    ),
+]
 Wrenches = Annotated[ArrayLike, Numbers("finite numbers of shape (k, dof)", ((ANY, ANY),))]
 WrenchExtents = Annotated[ArrayLike, Numbers("finite numbers, one a degree of freedom", ((ANY,),))]

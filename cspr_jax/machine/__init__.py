@@ -1,7 +1,8 @@
 """The machine: what drives the cables of a robot, from proved motions to motors, and back from measured lengths.
 
 Numbers of winches and elastic cables are part of the robot (`robots.model.winches`), and their limits are limits like
-all others (`schema.limits`). Sign conventions are those of `robots.model.winches`.
+all others (`schema.limits`). Stiffness and natural frequencies of poses are `robots.elasticity`, since maps of
+workspaces ask for them, too. Sign conventions are those of `robots.model.winches`.
 
 Files, each importing only from those above it:
 

@@ -1,0 +1,1 @@
+"""Elastic cables: springs, stiffness and mass matrices, natural frequencies and modes."""
