@@ -18,6 +18,7 @@ from cspr_jax.api.notebooks import Displayed
 from cspr_jax.api.plans import Plan
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, checked_plan
 from cspr_jax.config.reading import json_text
@@ -25,7 +26,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import reference_of, samples_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import Points, Positive, Quaternions
+from cspr_jax.errors.arguments import Cables, Points, Positive, Quaternions
 from cspr_jax.families.splines.functions import FunctionMotion, function_motion
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
@@ -216,6 +217,7 @@ def check(  # noqa: PLR0913
     trajectory: str | None = None,
     duration: Positive | None = None,
     limits: LimitsOrSpec = None,
+    without: Cables | None = None,
 ) -> Check:
     """Check with a proof whether a motion always keeps the limits of a robot.
 
@@ -237,6 +239,7 @@ def check(  # noqa: PLR0913
         trajectory: `id` of one of several trajectories in a file of CASPR; None for everything else.
         duration: duration of a function, s; None for everything else.
         limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
+        without: cables that are gone, from 0 on; limits of each cable still have one number per cable of the robot.
 
     Returns:
         the check, feasible or not.
@@ -249,7 +252,8 @@ def check(  # noqa: PLR0913
     _check_source(times, {"positions": positions, **samples}, duration)
     if trajectory is not None and not isinstance(times, str | Path):
         raise InputError("trajectory", trajectory, "absent but for a file of CASPR")
-    settings = {"interpolation": interpolation, "ends": ends, "smooth": smooth, "point": point}
+    settings: dict[str, Any] = {"interpolation": interpolation, "ends": ends, "smooth": smooth, "point": point}
+    settings["without"] = None if without is None else [int(i) for i in without]
     spec = check_keys(robot, limits, trajectory=trajectory, **settings)
     with double_precision():
         if isinstance(times, str | Path):
@@ -324,7 +328,7 @@ def _function(function: Any, duration: float | None, spec: PlanFile) -> Placed[F
         raise InputError("positions", None, "must be given beside times: (n, 3) m", problem="missing")
     if duration is None:
         raise InputError("duration", None, "must be given beside a function: s", problem="missing")
-    file = resolve_robot(spec.robot, NAME, Path())
+    file = without_cables(resolve_robot(spec.robot, NAME, Path()), spec.without, NAME)
     frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, spec, NAME))
     motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)
     return Placed(motion, frame)

@@ -19,7 +19,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.errors import InputError
-from cspr_jax.errors.arguments import ManyTimes, PointsOfMany, QuaternionsOfMany, VectorsOfMany
+from cspr_jax.errors.arguments import Cables, ManyTimes, PointsOfMany, QuaternionsOfMany, VectorsOfMany
 from cspr_jax.motion.cause import Cause
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
@@ -58,7 +58,7 @@ class ManyChecks(Columns):
 
 
 @checked(motion="spline")
-def check_many(
+def check_many(  # noqa: PLR0913
     robot: RobotOrFile,
     times: ManyTimes,
     positions: PointsOfMany,
@@ -69,6 +69,7 @@ def check_many(
     interpolation: Literal["cubic", "quintic", "hermite"] | None = None,
     ends: Literal["rest", "natural", "periodic"] | None = None,
     limits: LimitsOrSpec = None,
+    without: Cables | None = None,
 ) -> ManyChecks:
     """Check many motions of one robot; see `check`.
 
@@ -82,6 +83,7 @@ def check_many(
         interpolation: "cubic", "quintic" or "hermite"; None: "hermite" if there are velocities, else "cubic".
         ends: "rest", "natural" or "periodic"; None: "rest".
         limits: replace those of the robot, as for `check`.
+        without: cables that are gone, from 0 on, as for `check`.
 
     Returns:
         the checks.
@@ -89,7 +91,9 @@ def check_many(
     Raises:
         InputError: samples that do not define a motion, or an impossible argument.
     """
-    spec = checked_plan(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
+    settings: dict[str, Any] = {"interpolation": interpolation, "ends": ends}
+    settings["without"] = None if without is None else [int(i) for i in without]
+    spec = checked_plan(check_keys(robot, limits, **settings), NAME)
     samples_of_all = (positions, quaternions, velocities, accelerations)
     columns = [None if column is None else np.asarray(column) for column in samples_of_all]
     others = {"times": times, "quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
@@ -97,17 +101,17 @@ def check_many(
     _check_shapes(count, rows, {name: np.shape(array) for name, array in others.items() if array is not None})
     sample_times = np.broadcast_to(np.asarray(times, float), (count, rows))
     with double_precision():
-        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["spline"].legs])
+        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["spline"].legs], spec.without, NAME)
         problem = build_problem(file, spec, spec, NAME, any_cables=True)
         axes = frame_of(file.base_points, file.z_axis)
         reference = reference_of(build_robot(file, spec, NAME))
-        settings: dict[str, Any] = {"z_axis": file.z_axis, "is_platform": file.is_platform}
-        settings |= {"interpolation": interpolation, "ends": ends}
+        kind: dict[str, Any] = {"z_axis": file.z_axis, "is_platform": file.is_platform}
+        kind |= {"interpolation": interpolation, "ends": ends}
         motions = []
         for i in range(count):
             samples = samples_of(sample_times[i], *(None if column is None else column[i] for column in columns))
             try:
-                curve = kept_to(file.own_pattern, source_spline(samples, **settings), is_planar=False)
+                curve = kept_to(file.own_pattern, source_spline(samples, **kind), is_planar=False)
                 motions.append(placed_inward(curve, axes, reference))
             except InputError as error:
                 raise InputError(

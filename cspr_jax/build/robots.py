@@ -52,7 +52,8 @@ def build_limits(robot_file: RobotFile, spec: LimitKeys, file: object) -> Limits
     """Limits of a plan or sweep; where it gives none, those of the robot."""
     pairs = robot_file.pairs
     try:
-        limits = limits_of(robot_file, vars(spec), vars(robot_file), "", len(robot_file.as_written.base_points))
+        given = robot_file.of_own_cables(vars(spec))
+        limits = limits_of(robot_file, given, vars(robot_file), "", len(robot_file.as_written.base_points))
         return limits if pairs is None else pair_limits(limits, pairs)
     except InputError as error:
         raise ConfigError(file, str(error)) from error

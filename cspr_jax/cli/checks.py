@@ -18,6 +18,7 @@ from cspr_jax.cli.command import (
 from cspr_jax.cli.plans import (
     add_files,
     add_retime,
+    add_without,
     check_files,
     print_last_step,
     retime_settings,
@@ -62,6 +63,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="find the least uniform stretching of time that is feasible, and check what it stretches",
     )
+    add_without(parser)
     add_retime(parser, "run along its path in the least time that all limits allow, and check what comes of it")
     add_json(parser)
     add_files(parser, "400 rows", "write the motion even if it is not feasible")
@@ -76,7 +78,9 @@ def _spec(options: argparse.Namespace) -> dict[str, Any]:
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
         raise ConfigError("--smooth", f"{options.smooth}: must be a number > 0, in m")
-    spec = {name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point")}
+    spec = {
+        name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point", "without")
+    }
     spec = {name: value for name, value in spec.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)

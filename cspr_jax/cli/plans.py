@@ -91,6 +91,17 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
     )
 
 
+def add_without(parser: argparse.ArgumentParser) -> None:
+    """Add the option --without."""
+    parser.add_argument(
+        "--without",
+        type=int,
+        nargs="+",
+        metavar="CABLE",
+        help="cables that are gone, from 0 on: those of the robot file",
+    )
+
+
 def check_files(options: argparse.Namespace) -> None:
     """Refuse impossible options for files before slow work starts."""
     if options.output is not None and options.output.suffix not in ENDINGS:

@@ -1,15 +1,25 @@
-"""Choice of the robot that a plan or sweep moves: the robot of its file, or a point mass equivalent to it."""
+"""Choice of the robot that a plan or sweep moves: that of its file, what is left of it, or an equivalent point mass."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 
 PLATFORM = "3R3T"
 
 
-def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
-    """The robot itself, or its equivalent point mass where trajectory families, or a map, need a point mass."""
+def as_moved(
+    robot_file: RobotFile,
+    patterns: Iterable[Collection[str]],
+    without: Sequence[int] | str | None = None,
+    file: object = "robot",
+) -> RobotFile:
+    """The robot without the missing cables, or its equivalent where trajectory families, or a map, need a point mass.
+
+    `without` and `file` are those of `missing_cables.without_cables`.
+    """
+    robot_file = without_cables(robot_file, without, file)
     if not robot_file.is_platform:
         return robot_file
     if not robot_file.translation_only and all(PLATFORM in allowed for allowed in patterns):

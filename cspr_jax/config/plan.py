@@ -14,6 +14,7 @@ from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.path import PathTable
 from cspr_jax.config.keys.pose import Pose, Turns
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
+from cspr_jax.config.missing_cables import DESCRIPTION, MissingCables
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml, refuse_other_kinds
 from cspr_jax.config.wording import name_of, table_error
 from cspr_jax.errors import ConfigError, shown
@@ -39,6 +40,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    without: MissingCables | None = Field(None, description=DESCRIPTION)
     z0: Depth | None = Field(
         None,
         description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }; '

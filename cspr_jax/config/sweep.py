@@ -14,6 +14,7 @@ from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
 from cspr_jax.config.keys.path import TargetPath
 from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
+from cspr_jax.config.missing_cables import ANY_ONE, DESCRIPTION, MissingCables
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, name_of
 from cspr_jax.numerics.shapes import Float
@@ -190,12 +191,22 @@ class RunTable(Table):
         return names
 
 
+WithoutInSweeps = Annotated[
+    Annotated[MissingCables, Tag("~cables")] | Annotated[Literal["any-one"], Tag("~any")],
+    Discriminator(lambda value: "~any" if isinstance(value, str) else "~cables"),
+]
+
+
 class _SweepKeys(Table):
     # Keys of a sweep except those of obstacles, so that the reference lists obstacles last.
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    without: WithoutInSweeps | None = Field(
+        None,
+        description=f'{DESCRIPTION}; workspaces: "{ANY_ONE}", each single cable gone in turn, all must be feasible',
+    )
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"
     )

@@ -23,6 +23,7 @@ LARGEST_LENGTH = 1e6  # m
 LARGEST_TIME = 1e12  # s; powers of times must not overflow
 LARGEST_POPULATION = 4096
 LARGEST_DIVISIONS = 128
+MAX_CABLES = 1000
 LARGEST_SAMPLES = 1_000_000
 UNBOUNDED = 10**9  # maximum of numbers that the function itself bounds more narrowly
 
@@ -145,6 +146,7 @@ File = Annotated[
 ]
 
 Divisions = Annotated[int, Integer(4, LARGEST_DIVISIONS)]
+Cables = Annotated[Sequence[int], Many(Integer(0, MAX_CABLES - 1), "a list of cables, from 0 on")]
 Population = Annotated[int, Integer(16, LARGEST_POPULATION)]
 Samples = Annotated[int, Integer(1, LARGEST_SAMPLES)]
 Count = Annotated[int, Integer(1, UNBOUNDED)]

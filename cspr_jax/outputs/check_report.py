@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.peaks import EXTREMES
-from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdict_text
+from cspr_jax.outputs.plan_report import axes_text, finite, missing, retimed_words, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
@@ -31,6 +31,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
     fields = {
         "schema": SCHEMA,
         "robot": plan.robot_file.name,
+        **missing(plan),
         "verdict": verdict_text(answers.verdict[0], plan.feasible),
         "feasible": plan.feasible,
         "duration": float(answers.duration[0]),

@@ -24,6 +24,7 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
     fields = {
         "schema": SCHEMA,
         "robot": plan.robot_file.name,
+        **missing(plan),
         "family": plan.keys.family,
         "amplitude": plan.problem.amplitude.name if plan.keys.takes_amplitude else None,
         "z0": plan.z0,
@@ -35,6 +36,18 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
         "feasible": plan.feasible,
     }
     return finite(fields | {result.key: result.to_dict() for result in plan.outcomes})
+
+
+def missing(plan: PlannedMotions) -> dict[str, list[int]]:
+    """Field of cables that are gone, for JSON; none where the robot has all."""
+    cables = plan.robot_file.missing_cables
+    return {"without": list(cables)} if cables else {}
+
+
+def missing_words(plan: PlannedMotions) -> str:
+    """Words for the cables that are gone."""
+    numbers = [str(i + 1) for i in plan.robot_file.missing_cables]
+    return f"without cable{'s' * (len(numbers) > 1)} {', '.join(numbers)}" if numbers else ""
 
 
 def axes_text(plan: PlannedMotions) -> str:
@@ -97,7 +110,8 @@ def plan_table(plan: PlannedMotions):
     """The plan as a table for a terminal."""
     from rich.table import Table  # only a terminal needs it
 
-    words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
+    words = [missing_words(plan), ", ".join(plan.keys.families)]
+    words += [plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
     words += [f"z0 = {plan.z0:.{DIGITS}g} m"] if math.isfinite(plan.z0) else []
     title = f"{plan.robot_file.name}: {', '.join(filter(None, words))}"
     segments = plan_object(plan)["segments"]

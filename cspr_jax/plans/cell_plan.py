@@ -30,8 +30,9 @@ def cell_plan(
     shared = TrajectoryKeys.model_fields.keys() & PlanFile.model_fields.keys()
     trajectory = settings.get("trajectory", {})
     trajectory_keys = {name: value for name, value in trajectory.items() if name in shared}
-    if settings.get("limits"):
-        trajectory_keys["limits"] = settings["limits"]
+    for key in ("limits", "without"):
+        if settings.get(key):
+            trajectory_keys[key] = settings[key]
     if trajectory.get("family") == "path":
         return _path(settings, cell, {"samples": samples, **trajectory_keys})
     if "ellipse" in kind.takes:

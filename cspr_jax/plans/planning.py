@@ -149,7 +149,7 @@ def plan(path: Path) -> PlannedMotions:
 def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file's content."""
     legs_of = [FAMILIES[name].legs for name in plan_file.families]
-    robot_file = as_moved(resolve_robot(plan_file.robot, path, path.parent), legs_of)
+    robot_file = as_moved(resolve_robot(plan_file.robot, path, path.parent), legs_of, plan_file.without, path)
     if plan_file.point == "origin":
         from cspr_jax.plans.given_points import with_mass_centres  # loads parts of SciPy
 
@@ -172,7 +172,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
     why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
-    lines += nearly_resting(sequence.waypoints, z0)
+    lines += nearly_resting(sequence.waypoints, z0) + _renumbered(robot_file)
     lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
     return PlannedMotions(
         robot_file=robot_file,
@@ -188,6 +188,14 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
         warnings=tuple(dict.fromkeys(lines)),
         point=_point(plan_file, sequence),
     )
+
+
+def _renumbered(robot_file: RobotFile) -> list[str]:
+    gone = robot_file.missing_cables
+    if not gone:
+        return []
+    left = [str(i + 1) for i in range(len(robot_file.base_points) + len(gone)) if i not in gone]
+    return [f"without = {list(gone)}: cables 1, 2, ... of the results are cables {', '.join(left)} of the robot file"]
 
 
 def _point(plan_file: PlanFile, sequence: PlanLegs) -> str:

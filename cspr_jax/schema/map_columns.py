@@ -59,7 +59,7 @@ AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
 LIMITED = ("floor_margin", "length_margin", "speed_margin")
 MORE_OF_WORKSPACES = (
     *AMONG_OBSTACLES,
-    *("clearance_platform", *LIMITED, "capacity_margin", "cell_open"),
+    *("clearance_platform", *LIMITED, "capacity_margin", "cell_open", "worst_cable"),
 )
 _SUPPLIED = ("workspace.conditions.static", "workspace.conditions.wrench-feasible")
 _FREE = "workspace.conditions.interference-free"
@@ -76,6 +76,7 @@ WORKSPACES_ONLY_WITH = (
     (("speed_margin",), ("workspace.speed", "workspace.angular_speed")),
     (("cell_side", "cell_open"), ("workspace.prove",)),
     (("orientation_fraction",), ("workspace.orientations",)),
+    (("worst_cable",), ("without.any-one",)),
 )
 OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
 
@@ -87,4 +88,5 @@ WORKSPACES_STORED_WITH = (
     ("workspace.platform_hull", OF_SHAPES),
     ("workspace.capacity_length", ("capacity_margin",)),
     ("workspace.prove", ("cell_open",)),
+    ("without.any-one", ("worst_cable",)),
 )

@@ -10,11 +10,18 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import Quantity
 
 
+def _numbers_of_cables(settings: Mapping[str, Any]) -> list[int]:
+    # Numbers from 1 on, as in the file of the robot, of the cables that move it.
+    robot, without = settings["robot"], settings.get("without")
+    count = 3 if robot.get("translation_only") else len(robot["base_points"])
+    gone = without if isinstance(without, list) else []
+    return [k + 1 for k in range(count) if k not in gone]
+
+
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of bounds of the acceleration along a line, from 1 on, as in `families.lines.durations.names_of`."""
     robot, limits = settings["robot"], settings.get("limits") or {}
-    count = 3 if robot.get("translation_only") else len(robot["base_points"])
-    chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
+    chosen = itertools.combinations(_numbers_of_cables(settings), 1 if robot.get("planar") else 2)
     limit_values = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
     # A smallest tension of zero is no further limit, since cables must be taut anyway.
     moving = [name for name, value in limit_values.items() if value is not None and np.any(value)]
@@ -23,13 +30,12 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
 
 def slack_cables(settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Cables that get slack first on an ellipse."""
-    robot = settings["robot"]
-    count = 3 if robot.get("translation_only") else len(robot["base_points"])
+    robot, numbers = settings["robot"], _numbers_of_cables(settings)
     dof = 2 if robot.get("planar") or robot.get("pattern") == "2T" else 3
-    if count == dof:
-        cables = [f"cable {k + 1}" for k in range(count)]
+    if len(numbers) == dof:
+        cables = [f"cable {number}" for number in numbers]
     else:
-        pairs = itertools.combinations(range(1, count + 1), dof - 1)
+        pairs = itertools.combinations(numbers, dof - 1)
         cables = [f"all but {', '.join(map(str, pair))}" for pair in pairs]
     return ("unknown", *cables, "depth")
 

@@ -13,6 +13,13 @@ _ROWS = {
     "units": ("", "With `rows`: their units."),
     "last_step": ("s", "With `--rate`: time between the last two rows, of which the last is the end of the motion."),
 }
+_WITHOUT = {
+    "without": (
+        "",
+        "Cables that are gone, from 0 on; absent where all are there. All other numbers of cables are those of a robot "
+        "without them.",
+    )
+}
 # Fields of segments and of checks.
 _EXTREMES = {
     **{row.name: (row.unit.replace("/s", " s-1").replace("-1^", "-"), row.extreme) for row in LIMITS if row.peak},
@@ -21,6 +28,7 @@ _EXTREMES = {
 PLAN_OBJECT = {
     "schema": ("1", "Version of these fields."),
     "robot": ("", "Name of the robot."),
+    **_WITHOUT,
     "family": ("", "Trajectory family of the plan."),
     "amplitude": ("", "Amplitude function; null for families that have a law of their own."),
     "z0": ("m", "Depth of P0 below the centroid of the spools, given or chosen; null without P0."),

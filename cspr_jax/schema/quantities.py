@@ -756,6 +756,14 @@ QUANTITIES = {
             meanings="nearest-bodies",
         ),
         Quantity(
+            "worst_cable",
+            "1",
+            "cable whose loss is the worst",
+            "Number, from 1 on, of the cable without which the first margin of the map that is requested (of tensions, "
+            "closure, capacity, clearance) is the smallest.",
+            "int16",
+        ),
+        Quantity(
             "floor_margin",
             "m",
             "height above the floor",

@@ -7,6 +7,7 @@ import numpy as np
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.keys.obstacles import ObstacleKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
+from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, SweepFile
@@ -26,6 +27,8 @@ _SPECIAL = (
     "point",
     *ObstacleKeys.model_fields,
 )
+# A value of a key that counts as a key.
+EACH_GONE = f"without.{ANY_ONE}"
 # Largest number of kinds that a hint names.
 _FEW = 3
 
@@ -47,6 +50,8 @@ def check_map(kind: MapKind, spec: SweepFile, path: Path) -> None:
             others = any(name in form.keys for form in MAP_KINDS[spec.map].forms)
             where = f'with family = "{spec.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
             raise ConfigError(path, f"{name}: must be absent {where}")
+    if spec.without == ANY_ONE and "workspace" not in kind.takes:
+        raise ConfigError(path, f'without = "{ANY_ONE}": must be a list of cables, from 0 on, in this map')
     _check_limits(kind, spec, path)
     if spec.orientations is not None and spec.orientations.definition is not None:
         _check_choice(spec.orientations.definition, "orientations.definition", kind.definitions, path)
@@ -79,12 +84,16 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
 
 def is_given(spec: SweepFile, name: str) -> bool:
     """Tell whether a sweep has a key."""
+    if name == EACH_GONE:
+        return spec.without == ANY_ONE
     return _missing(spec, name) is None
 
 
 def is_asked(spec: SweepFile, robot: RobotFile, name: str) -> bool:
     """Tell whether a sweep or its robot gives a key, so that quantities that depend on it have values."""
     table, _, last = name.rpartition(".")
+    if name == EACH_GONE:
+        return is_given(spec, name)
     if table == "workspace.conditions":
         return last in (spec.workspace or WorkspaceTable()).conditions
     if table == "limits" and getattr(robot, last, None) is not None:
@@ -104,6 +113,8 @@ def check_store(kind: MapKind, spec: SweepFile, robot: RobotFile, path: Path) ->
 
 def _as_written(name: str) -> str:
     table, _, last = name.rpartition(".")
+    if name == EACH_GONE:
+        return f'without = "{ANY_ONE}"'
     return f'"{last}" among workspace.conditions' if table == "workspace.conditions" else name
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from cspr_jax import __version__
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.keys.workspace import WorkspaceTable
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.reading import checked, parse_toml, read_text, refuse_other_kinds
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
@@ -98,6 +99,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     robot = resolve_robot(spec.robot, path, path.parent)
     kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
     check_map(kind, spec, path)
+    robot = without_cables(robot, spec.without, path)
     robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
     orientation_axes = _orientation_axes(spec) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(spec.axes, name)) for name in data["axes"]}
@@ -122,10 +124,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
     """The sweep that a run has recorded, even if its file has changed or is gone."""
     spec = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
-    robot, kind = (
-        checked(RobotFile, settings["robot"], file, at="robot"),
-        MAP_KINDS[spec.map].of(spec.trajectory.family),
-    )
+    kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
+    robot = without_cables(checked(RobotFile, settings["robot"], file, at="robot"), spec.without, file)
     over_orientations = _orientation_axes(spec) if kind.is_over_orientations else {}
     file_axes = {name: axis_points(getattr(spec.axes, name)) for name in settings["axes"]}
     axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}

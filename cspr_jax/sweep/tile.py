@@ -6,6 +6,7 @@ import pickle
 import jax
 import numpy as np
 
+from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.numerics.elementary import double_precision
@@ -30,7 +31,7 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            self._cells: GridMap = sweep.kind.load()(sweep.robot, sweep.spec, sweep.file)
+            self._cells: GridMap = _map_of(sweep)
             self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:
@@ -54,6 +55,15 @@ class TileMap:
         return Computed(
             Shard(index, digest(this_environment), _near_zero(answers), values, undecided), this_environment
         )
+
+
+def _map_of(sweep: Sweep) -> GridMap:
+    make = sweep.kind.load()
+    if sweep.spec.without != ANY_ONE:
+        return make(sweep.robot, sweep.spec, sweep.file)
+    from cspr_jax.workspaces.any_cable_gone import AnyCableGone  # other maps do without workspaces
+
+    return AnyCableGone(make, sweep.robot, sweep.spec, sweep.file)
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:

@@ -23,6 +23,7 @@ Files, each importing only from those above it:
     acceleration_search   feasible accelerations at many positions
     sensitivities         sensitivities to errors of the cable lengths
     map                   maps of workspaces
+    any_cable_gone        maps of what is left of a workspace when any one cable is gone
     accelerations_map     maps of feasible accelerations
     sensitivity_map       maps of sensitivities
 """

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.motions.table import Z_AXES
 from cspr_jax.config.plan import PlanFile, checked_plan, plan_of_text, read_plan
 from cspr_jax.config.reading import checked, json_text, read_text
@@ -49,9 +50,11 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
     plan_file = read_plan(text, path)
-    robot_file = as_moved(
-        resolve_robot(plan_file.robot, path, path.parent), [FAMILIES[name].legs for name in plan_file.families]
+    robot_file, legs_of = (
+        resolve_robot(plan_file.robot, path, path.parent),
+        [FAMILIES[n].legs for n in plan_file.families],
     )
+    robot_file = as_moved(robot_file, legs_of, plan_file.without, path)
     others = {"family": plan_file.family} | ({"z0": plan_file.z0} if isinstance(plan_file.z0, float) else {})
     return _with_robot_file(result, file, robot_file, path, others | {"plan": text})
 
@@ -61,7 +64,7 @@ def with_robot(result: Result, file: str, spec: dict[str, Any]) -> Result:
     robot = spec["robot"]
     _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
     plan = checked_plan(spec, "--robot")
-    robot_file = resolve_robot(plan.robot, "--robot", Path())
+    robot_file = without_cables(resolve_robot(plan.robot, "--robot", Path()), plan.without, "--robot")
     # For a platform that only translates, motion files have the cables of the equivalent point mass.
     robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
     return _with_robot_file(result, file, robot_file, "--robot", {"plan": json_text(spec)})
@@ -112,5 +115,6 @@ def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile,
         raise InputError("--quantity", quantity, allowed, problem=error)
     settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
-    robot_file = checked(RobotFile, json.loads(settings), file)
-    return robot_file.equivalent() if robot_file.translation_only else robot_file, plan_of_text(text, Path(file))
+    plan = plan_of_text(text, Path(file))
+    robot_file = without_cables(checked(RobotFile, json.loads(settings), file), plan.without, file)
+    return robot_file.equivalent() if robot_file.translation_only else robot_file, plan

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.config.keys.workspace import WorkspaceTable
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
@@ -40,7 +41,7 @@ class Posed(NamedTuple):
 
 def robot_of(result: Result) -> RobotFile:
     """The robot of a map."""
-    return RobotFile(**result.settings["robot"])
+    return without_cables(RobotFile(**result.settings["robot"]), result.settings.get("without"), "result")
 
 
 def workspace_of(result: Result) -> WorkspaceTable:

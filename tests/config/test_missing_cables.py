@@ -1,0 +1,159 @@
+"""Robots without some cables: bit for bit those of files from which the cables were taken by hand."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from support.commands import cspr, refuse_sweep, strict_json, swept
+
+import cspr_jax
+from cspr_jax.config.missing_cables import without_cables
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import ConfigError
+
+SPOOLS = [[1.2, 0.0, 0.0], [0.4, 1.1, 0.05], [-1.0, 0.7, 0.0], [-0.9, -0.7, 0.0], [0.3, -1.2, 0.1]]
+EACH = {
+    "base_points": SPOOLS,
+    "tension_max": [20.0, 21.0, 22.0, 23.0, 24.0],
+    "axial_stiffness": [1e4, 2e4, 3e4, 4e4, 5e4],
+    "pulley_radius": [0.01, 0.02, 0.03, 0.04, 0.05],
+    "pulley_axes": [[0.0, 0.0, -1.0], [0.0, 0.1, -1.0], [0.1, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0]],
+}
+ROBOT = {"name": "five", "mass": 1.0, "tension_min": 0.5, "cable_speed_max": [3.0, 3.1, 3.2, 3.3, 3.4]} | EACH
+WINCH = {"drum_radius": [0.02, 0.03, 0.04, 0.05, 0.06], "gear_ratio": 5.0}
+POSES = [
+    {"position": [0.0, 0.0, 1.5], "time": 0.0},
+    {"position": [0.15, 0.1, 1.4], "time": 1.5},
+    {"position": [0.1, -0.1, 1.5], "time": 3.0},
+]
+LIMITS = {"cable_length_max": [2.5, 2.6, 2.7, 2.8, 2.9]}
+
+
+def _by_hand(table, gone):
+    each = {name for name, value in table.items() if isinstance(value, list) and len(value) == len(SPOOLS)}
+    return table | {name: [x for i, x in enumerate(table[name]) if i not in gone] for name in each}
+
+
+def _toml(table):
+    """A plan or sweep whose values are all written in one line."""
+    return "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
+
+
+def _value(value):
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(value)
+
+
+def _plan(robot, **more):
+    return _toml({"schema": 1, "family": "spline", "robot": robot, **more, "pose": POSES})
+
+
+def test_lists_lose_the_entries_of_missing_cables():
+    read = lambda table: RobotFile(**tomllib.loads(_toml(table)))  # noqa: E731
+    whole = read(ROBOT | {"winch": WINCH})
+    left = without_cables(whole, [1], "f")
+    assert left.model_dump() == read(_by_hand(ROBOT, (1,)) | {"winch": _by_hand(WINCH, (1,))}).model_dump()
+    assert left.settings == whole.settings and left.missing_cables == (1,)
+    assert without_cables(whole, None, "f") is whole
+
+
+def test_a_plan_is_that_of_a_robot_cut_by_hand(tmp_path):
+    (tmp_path / "a.toml").write_text(_plan(ROBOT | {"winch": WINCH}, without=[1], limits=LIMITS))
+    cut = _by_hand(ROBOT, (1,)) | {"winch": _by_hand(WINCH, (1,))}
+    (tmp_path / "b.toml").write_text(_plan(cut, limits=_by_hand(LIMITS, (1,))))
+    code, out, error = cspr("plan", tmp_path / "a.toml", "--json", "-o", tmp_path / "a.h5")
+    assert (code, error.count("\n")) == (0, 1) and "cables 1, 3, 4, 5 of the robot file" in error
+    one, other = strict_json(out), strict_json(cspr("plan", tmp_path / "b.toml", "--json")[1])
+    assert one.pop("without") == [1] and one == other
+    # The file keeps the robot as it is written, and is read and drawn as that of three cables.
+    result = cspr_jax.open_result(tmp_path / "a.h5")
+    assert len(json.loads(result.attributes["robot_settings"])["base_points"]) == 5
+    assert result.data["tension"].shape[1] == 4
+    assert cspr("plot", tmp_path / "a.h5", "--quantity", "summary", "-o", tmp_path / "a.png")[0] == 0
+
+
+def test_a_check_takes_missing_cables(tmp_path):
+    t, points = np.linspace(0.0, 2.0, 9), np.linspace([0.0, 0.0, 1.5], [0.1, 0.1, 1.4], 9)
+    np.savetxt(tmp_path / "m.csv", np.c_[t, points], delimiter=",", header="t,x,y,z", comments="")
+    (tmp_path / "r.toml").write_text(_toml(ROBOT))
+    (tmp_path / "cut.toml").write_text(_toml(_by_hand(ROBOT, (2,))))
+    answers = [
+        strict_json(cspr("check", tmp_path / "m.csv", "--robot", tmp_path / file, *words, "--json")[1])
+        for file, words in (("r.toml", ("--without", "2")), ("cut.toml", ()))
+    ]
+    assert answers[0].pop("without") == [2] and answers[0] == answers[1]
+    check = cspr_jax.check(tmp_path / "r.toml", t, points, without=[2])
+    assert check.margin == answers[0]["margin"]
+    many = cspr_jax.check_many(tmp_path / "r.toml", t, points[None], without=[2])
+    assert many.verdict[0] == 0 and abs(many.margin[0] - check.margin) < 1e-9
+
+
+SWEEP = {
+    "schema": 1,
+    "map": "workspace",
+    "axes": {
+        "x": {"start": -1.0, "stop": 1.0, "count": 6},
+        "y": {"start": -1.0, "stop": 1.0, "count": 5},
+        "z": [0.8, 1.6],
+    },
+    "workspace": {"conditions": ["wrench-feasible"]},
+}
+PLAIN = {"name": "five", "mass": 1.0, "tension_min": 0.5, "base_points": SPOOLS, "tension_max": EACH["tension_max"]}
+
+
+def test_any_cable_gone_is_what_the_robots_without_each_have_in_common(tmp_path):
+    each = []
+    for i in range(5):
+        (tmp_path / str(i)).mkdir()
+        each.append(swept(tmp_path / str(i), _toml(SWEEP | {"robot": _by_hand(PLAIN, (i,))})))
+        (tmp_path / f"w{i}").mkdir()
+        one = swept(tmp_path / f"w{i}", _toml(SWEEP | {"robot": PLAIN, "without": [i]}))
+        np.testing.assert_array_equal(one.data["wrench_margin"], each[i].data["wrench_margin"])
+        np.testing.assert_array_equal(one.data["verdict"], each[i].data["verdict"])
+        assert one.attributes["identity"] != each[i].attributes["identity"]
+    common = swept(tmp_path, _toml(SWEEP | {"robot": PLAIN, "without": "any-one"}))
+    margins = np.array([one.data["wrench_margin"] for one in each])
+    np.testing.assert_array_equal(common.data["wrench_margin"], margins.min(0))
+    np.testing.assert_array_equal(common.data["worst_cable"], margins.argmin(0) + 1)
+    inside = np.all([one.data["verdict"] == 0 for one in each], axis=0)
+    np.testing.assert_array_equal(common.data["verdict"] == 0, inside)
+    assert 0 < inside.sum() < inside.size
+    assert cspr("plot", tmp_path / "run" / "s.h5", "--quantity", "worst_cable", "-o", tmp_path / "w.png")[0] == 0
+    assert cspr("verify", tmp_path / "run")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("without", "words"),
+    [
+        ([5], "must be cables of five, from 0 to 4, each once"),
+        ([1, 1], "each once"),
+        ([0, 1, 2], "2 cables are left for 3 degrees of freedom: the mass swings in the vertical plane"),
+        ([0, 1, 2, 3, 4], "0 cables are left for 3 degrees of freedom: it falls"),
+        ([], "at least"),
+        ([-1], "without[0]"),
+        ("any-one", "must be a list of cables"),
+    ],
+)
+def test_impossible_cables_are_refused(tmp_path, without, words):
+    sweep = SWEEP | {"map": "feasible-acceleration", "robot": PLAIN, "without": without}
+    del sweep["workspace"]
+    refuse_sweep(tmp_path, _toml(sweep), words)
+
+
+def test_limits_of_each_cable_are_those_of_the_file(tmp_path):
+    (tmp_path / "a.toml").write_text(_plan(ROBOT, without=[1], limits={"tension_max": [20.0, 20.0, 20.0]}))
+    code, _, error = cspr("plan", tmp_path / "a.toml")
+    assert code == 2 and "tension_max = [20.0, 20.0, 20.0]" in error and "or 5: one a cable" in error
+    assert error.count("\n") == 1
+
+
+def test_a_planar_robot_keeps_level_spools():
+    table = {"name": "p", "mass": 1.0, "planar": True, "base_points": [[-1.0, 0, 0], [1.0, 0, 0], [0.0, 0, -0.5]]}
+    whole = RobotFile(**tomllib.loads(_toml(table)))
+    assert without_cables(whole, [2], "f").base_points == whole.base_points[:2]
+    with pytest.raises(ConfigError, match=r"^f: without = \[0\]: base_points = .*level"):
+        without_cables(whole, [0], "f")
