@@ -61,7 +61,7 @@ AT_REST = 1e-9
 
 
 def _resting(state: State, drums: DrumStates) -> DrumStates:
-    # Before and after a motion from rest to rest the drums rest too, also where its third derivative begins with a jump.
+    # Before and after a motion from rest to rest the drums rest too, even if its third derivative jumps there.
     moving = [state.velocity, state.acceleration, state.angular_velocity, state.angular_acceleration]
     fastest = jnp.max(jnp.concatenate([jnp.abs(jnp.ravel(each)) for each in moving if each is not None]))
     rests = fastest <= AT_REST

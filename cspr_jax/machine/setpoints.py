@@ -29,7 +29,7 @@ class SetPoints(NamedTuple):
 
     Fields:
         t: (m,) times k / rate from the start, and the exact end, s.
-        length: length of each cable without load, as its drum pays it out; of cables that do not stretch, its length, m.
+        length: length of each cable without load, which its drum pays out, m.
         rate: its rate, m/s.
         acceleration: its acceleration, m/s^2.
         tension: tension of each cable, N.

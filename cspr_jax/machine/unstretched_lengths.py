@@ -1,4 +1,4 @@
-"""Unstretched lengths of elastic cables: l0 = l / (1 + f / EA), which drums pay out so that cables have the length l."""
+"""Unstretched lengths l0 = l / (1 + f / EA) of elastic cables, which drums pay out so that cables have the length l."""
 
 from __future__ import annotations
 

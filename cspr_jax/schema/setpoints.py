@@ -11,3 +11,4 @@ USUAL_RATE = 1000.0  # Hz
 LARGEST_RATE = 1e6  # Hz
 # Names of joints of robots with winches, and of others.
 MOTOR, CABLE = "winch", "cable"
+NANO = 1_000_000_000  # nanoseconds of a second

@@ -15,9 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from cspr_jax.machine.setpoints import SetPoints
-from cspr_jax.schema.setpoints import CABLE, MOTOR
+from cspr_jax.schema.setpoints import CABLE, MOTOR, NANO
 
-NANO = 1_000_000_000
 _HEADER = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
 
 

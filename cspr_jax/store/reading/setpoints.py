@@ -11,7 +11,7 @@ import numpy as np
 
 from cspr_jax.config.reading import read_text
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.schema.setpoints import MOTOR, SETPOINT_FORMATS
+from cspr_jax.schema.setpoints import MOTOR, NANO, SETPOINT_FORMATS
 
 _HEAD = re.compile(r"^([a-z_]+?)_([1-9]\d{0,3})$")
 _CYCLE = re.compile(r"^# cycle time (\S+) s$")
@@ -67,7 +67,7 @@ def _parsed(path: Path, text: str) -> Any:
             return json.loads(text)
         import yaml  # few commands read YAML
 
-        return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # noqa: S506
+        return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except ValueError as error:
         raise ConfigError(path, f"no JSON: {error}") from None
     except Exception as error:
@@ -80,7 +80,8 @@ def _joints(path: Path, message: Any) -> dict[str, np.ndarray]:
     try:
         names, points = message["joint_names"], message["points"]
         is_cable = not str(names[0]).startswith(MOTOR)
-        stamps = [(point["time_from_start"]["sec"], point["time_from_start"]["nanosec"]) for point in points]
+        stamps = [point["time_from_start"] for point in points]
+        times = np.array([(stamp["sec"] * NANO + stamp["nanosec"]) / NANO for stamp in stamps], float)
         arrays = {
             own[is_cable]: np.array([point[name] for point in points], float)
             for name, own in _OF_JOINTS.items()
@@ -92,4 +93,4 @@ def _joints(path: Path, message: Any) -> dict[str, np.ndarray]:
         raise ConfigError(path, f"points must hold {len(names)} numbers each: one a joint")
     if "tension" in arrays:
         arrays["tension"] = -arrays["tension"]
-    return {"t": np.array([sec + 1e-9 * nanosec for sec, nanosec in stamps], float), **arrays}
+    return {"t": times, **arrays}
