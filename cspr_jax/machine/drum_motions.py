@@ -16,11 +16,11 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.machine.unstretched_lengths import unstretched_lengths
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot, cable_motion
+from cspr_jax.robots.elasticity.springs import unstretched_lengths
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.model.winches import MotorStates, motor_states
