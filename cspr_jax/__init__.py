@@ -35,6 +35,7 @@ _MODULES = {
     "ellipse_frequencies": "api.families.ellipses",
     "ellipse_margins": "api.families.ellipses",
     "encoder_error": "api.workspaces",
+    "forward": "api.forward_kinematics",
     "hypocycloid": "api.families.motions",
     "import_robot": "api.files.imports",
     "keep_compiled_code": "api.sweeps",

@@ -119,7 +119,13 @@ def good():
     values |= {"times": [0.0, 1.0], "paths": [[[0.4, 0.1, 1.5], [0.3, 0.1, 1.5]]]}
     places = [{"position": [0.1, 0.0, 1.5]}, {"position": [0.1, 0.1, 1.5]}]
     values |= {"plan": cspr_jax.plan({"schema": 1, "robot": "prototype", "family": "quintic", "pose": places})}
-    values |= {"durations": [1.0], "name": "quintic", "what": "robot", "errors": cspr_jax.LaunchErrors()}
+    values |= {
+        "durations": [1.0],
+        "lengths": [[1.5, 1.5, 1.5]],
+        "name": "quintic",
+        "what": "robot",
+        "errors": cspr_jax.LaunchErrors(),
+    }
     return values
 
 
