@@ -22,12 +22,14 @@ from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.plans import planning
 from cspr_jax.schema import labelled
+from cspr_jax.schema.setpoints import USUAL_RATE
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
 
 if TYPE_CHECKING:
     import xarray
 
+    from cspr_jax.machine.setpoints import SetPoints
     from cspr_jax.store.reading.result import Result
 
 # Errors name this instead of a file if there is no file; paths are then relative to the current folder.
@@ -100,6 +102,48 @@ class Plan(Displayed, planning.PlannedMotions):
             write = motion_json.write_json if path.suffix == ".json" else motion_files.write_rows
             write(self, path, rate=rate)
         return path
+
+    @checked()
+    def setpoints(self, rate: float = USUAL_RATE) -> SetPoints:
+        """Set points of the axes: what drums and motors do, evaluated at the instants, not interpolated.
+
+        Args:
+            rate: instants per second over the full plan, Hz, at most 1e6, plus one at its end.
+
+        Returns:
+            times, lengths that drums pay out, tensions, and for a robot with winches angles, speeds and feed-forward
+            torques of the motors; see `cspr_jax.machine.setpoints.SetPoints`.
+
+        Raises:
+            ConfigError: the rate is out of range or gives too many set points, or the plan has no finite motion.
+        """
+        from cspr_jax.outputs.setpoints.formats import points_of  # few plans are written as set points
+
+        with double_precision():
+            return points_of(self, rate)
+
+    @checked()
+    def save_setpoints(self, path: str | Path, rate: float = USUAL_RATE) -> Path:
+        """Write set points for a controller, of a feasible plan alone.
+
+        Args:
+            path: file to write; an existing file is replaced. .csv: a header line and numbers; .yaml and .json: a
+                JointTrajectory of ROS 2; .txt: counts of the encoders, one row a cycle.
+            rate: as for `setpoints`.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: the wrong ending, a plan that is not feasible, a robot without what the format needs, or a
+                rate out of range or with too many set points.
+            StoreError: a file cannot be written.
+        """
+        from cspr_jax.outputs.setpoints.formats import write_set_points  # few plans are written as set points
+
+        with double_precision():
+            write_set_points(self, Path(path), rate)
+        return Path(path)
 
     @checked()
     def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False) -> Path:

@@ -95,7 +95,8 @@ def _spec(options: argparse.Namespace) -> dict[str, Any]:
 def _check(options: argparse.Namespace) -> int:
     check_files(options)
     control = None if options.mjcf is None else options.mjcf.with_name(f"{options.mjcf.stem}_control.csv")
-    for option, path in (("-o", options.output), ("--mjcf", options.mjcf), ("--mjcf", control)):
+    written = {"-o": options.output, "--setpoints": options.setpoints, "--mjcf": options.mjcf}
+    for option, path in (*written.items(), ("--mjcf", control)):
         if path is not None and path.resolve() == options.motion.resolve():
             raise ConfigError(option, f"{path}: must be another name: the motion is there")
     settings = retime_settings(options)
@@ -107,8 +108,7 @@ def _check(options: argparse.Namespace) -> int:
         from cspr_jax.api import checks
 
         outputs = {
-            "-o": options.output,
-            "--mjcf": options.mjcf,
+            **written,
             "--animate": options.animate,
             "--slower": options.slower,
             "--retime": options.retime,

@@ -20,6 +20,7 @@ from cspr_jax.cli.command import (
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
 from cspr_jax.runtime.progress import waiting
+from cspr_jax.schema.setpoints import LARGEST_RATE, SETPOINT_FORMATS, USUAL_RATE
 from cspr_jax.store.files.publishing import check_writable
 
 ENDINGS = (".csv", ".h5", ".json")
@@ -76,7 +77,14 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
         "--rate",
         type=float,
         metavar="HZ",
-        help=f"rows of -o per second (default: {usual_rows}); without -o, --json has them",
+        help=f"rows of -o per second (default: {usual_rows}), and set points per second (default: {USUAL_RATE:g}); "
+        "without -o and --setpoints, --json has the rows",
+    )
+    parser.add_argument(
+        "--setpoints",
+        type=Path,
+        metavar="FILE",
+        help="write set points for the motors of a feasible motion: .csv, .yaml and .json (ROS 2), .txt (counts)",
     )
     parser.add_argument(
         "--mjcf",
@@ -106,8 +114,9 @@ def check_files(options: argparse.Namespace) -> None:
     """Refuse impossible options for files before slow work starts."""
     if options.output is not None and options.output.suffix not in ENDINGS:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5 or .json")
-    if options.rate is not None and options.output is None and not options.json:
-        raise ConfigError("--rate", "must be absent without -o or --json")
+    if options.rate is not None and options.output is options.setpoints is None and not options.json:
+        raise ConfigError("--rate", "must be absent without -o, --setpoints or --json")
+    _check_setpoints(options)
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
     if options.mjcf is not None and options.mjcf.suffix != ".xml":
@@ -123,11 +132,23 @@ def check_files(options: argparse.Namespace) -> None:
     if options.step is not None and options.mjcf is None:
         raise ConfigError("--step", "must be absent without --mjcf")
     _check_step(options)
-    has_rows = options.json and options.rate is not None
+    has_rows = options.json and options.rate is not None and options.setpoints is None
     if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
         raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
-    for path in (options.output, options.mjcf, options.animate):
+    for path in (options.output, options.mjcf, options.animate, options.setpoints):
         check_writable(path)
+
+
+def _check_setpoints(options: argparse.Namespace) -> None:
+    path = options.setpoints
+    if path is None:
+        return
+    if path.suffix not in SETPOINT_FORMATS:
+        raise ConfigError("--setpoints", f"{path}: must end in {' or '.join(SETPOINT_FORMATS)}")
+    if options.rate is not None and not 0.0 < options.rate <= LARGEST_RATE:
+        raise ConfigError("--rate", f"{options.rate:g}: must be a number > 0, at most {LARGEST_RATE:g}, in Hz")
+    if path in (options.output, options.mjcf and options.mjcf.with_name(f"{options.mjcf.stem}_control.csv")):
+        raise ConfigError("--setpoints", f"{path}: must be another name: another file of the motion is written there")
 
 
 def _check_step(options: argparse.Namespace) -> None:
@@ -186,7 +207,7 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
         return {}
     step = last_step(plan, options.rate)
     of_step = {"last_step": step if math.isfinite(step) else None}
-    if options.output is not None:
+    if options.output is not None or options.setpoints is not None:
         return of_step
     if not (plan.feasible or options.anyway):
         warn("rows: left out, since a segment is not proved feasible (--anyway gives them)")
@@ -197,6 +218,11 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
 def write_files(plan: Any, options: argparse.Namespace) -> None:
     """Write the files that options name; if the motion is not feasible, only with --anyway."""
     of_mjcf = {} if options.step is None else {"step": options.step}
+    if options.setpoints is not None and plan.feasible:
+        with waiting():
+            plan.save_setpoints(options.setpoints, options.rate or USUAL_RATE)
+    elif options.setpoints is not None:
+        warn(f"{options.setpoints}: not written, since a segment is not proved feasible")
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
         (options.mjcf, lambda path: plan.save_mjcf(path, anyway=True, **of_mjcf)),

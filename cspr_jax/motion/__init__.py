@@ -6,6 +6,7 @@ motion of any robot; answers, legs and waypoints are common to all families. No 
 Files, each importing only from those above it:
 
     motion              the protocol: duration, state, breaks; motions reversed and placed
+    ticks               ticks of a clock over consecutive motions
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
     swing_plane         the plane in which an effector swings between two points
     platform_kind       kinds of motions of platforms, static in compiled functions

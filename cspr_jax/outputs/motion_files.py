@@ -16,6 +16,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.families.lines.motion import TimedLine
 from cspr_jax.motion.acceleration_sets import along
 from cspr_jax.motion.motion import Motion, common_shape, outward
+from cspr_jax.motion.ticks import ticks
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.binding import binding
 from cspr_jax.outputs.paths import path_columns
@@ -55,8 +56,6 @@ _FIELDS = {
 LARGEST_ROWS = 20_000_000
 # Quantities that may be infinite at some times although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
-# A tick closer to the end of a segment than this fraction of the time between ticks is that end.
-SAME_TICK = 1e-6
 
 
 @persistent_jit(static_argnames=("rule", "with_couples"))
@@ -91,18 +90,8 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
         raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
     if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
         raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
-    starts = np.concatenate([[0.0], np.cumsum(plan.answers.duration)])
-    taus = []
-    for i, length in enumerate(plan.answers.duration):
-        if rate is None:
-            tau = np.linspace(0.0, 1.0, plan.keys.samples)
-        else:
-            ticks = np.arange(*np.ceil(starts[i : i + 2] * rate - SAME_TICK))
-            tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
-            if i == len(plan.answers.duration) - 1:
-                tau = np.append(tau, 1.0)
-        taus.append(tau)
-    columns = rows_at(plan, taus)
+    every_segment = [np.linspace(0.0, 1.0, plan.keys.samples)] * len(plan.answers.duration)
+    columns = rows_at(plan, every_segment if rate is None else ticks(plan.answers.duration, rate)[1])
     if not plan.is_at_origin:
         return columns
     from cspr_jax.outputs.platform_poses import at_origin  # SciPy's rotations take time
