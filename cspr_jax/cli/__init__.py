@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cspr_jax import __version__
-from cspr_jax.cli import checks, listings, pictures, plans, published, sweeps
+from cspr_jax.cli import checks, listings, pictures, plans, published, simulations, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
 from cspr_jax.outputs.plots.style.options import with_widths
@@ -174,7 +174,15 @@ def _complete_files(parser: argparse.ArgumentParser, files: dict[str, Any]) -> N
 
 # Commands in the order of the help; a new command is a row of one of these modules.
 COMMANDS = (
-    *(*sweeps.COMMANDS, *plans.COMMANDS, *checks.COMMANDS, *pictures.COMMANDS, *published.COMMANDS, *listings.COMMANDS),
+    *(
+        *sweeps.COMMANDS,
+        *plans.COMMANDS,
+        *simulations.COMMANDS,
+        *checks.COMMANDS,
+        *pictures.COMMANDS,
+        *published.COMMANDS,
+        *listings.COMMANDS,
+    ),
     Command("completion", "print a script with which a shell completes commands", _add_completion, _completion),
 )
 

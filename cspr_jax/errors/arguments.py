@@ -150,11 +150,14 @@ Cables = Annotated[Sequence[int], Many(Integer(0, MAX_CABLES - 1), "a list of ca
 Population = Annotated[int, Integer(16, LARGEST_POPULATION)]
 Samples = Annotated[int, Integer(1, LARGEST_SAMPLES)]
 Count = Annotated[int, Integer(1, UNBOUNDED)]
+Seed = Annotated[int, Integer(0, UNBOUNDED)]
 AnyInteger = Annotated[int, Integer(-UNBOUNDED, UNBOUNDED)]
 TileRange = Annotated[tuple[int, int], Numbers("two integers, first and end", ((2,),))]
 
 NUMBER = Numbers("a number", infinite=True, nan=True)
 Positive = Annotated[float, Numbers("a finite number > 0", positive=True)]
+NotNegative = Annotated[float, Numbers("a finite number >= 0", minimum=0.0)]
+NotNegativeOrNone = Annotated[float | None, Choice(Numbers("a finite number >= 0", minimum=0.0), (None,))]
 Length = Annotated[float, Numbers("a number > 0, in m", positive=True)]
 Diameter = Annotated[float, Numbers("a number >= 0, in m", minimum=0.0)]
 CableErrors = Annotated[ArrayLike, Numbers("a number >= 0, in m, or one for each position", ((), (ANY,)), minimum=0.0)]

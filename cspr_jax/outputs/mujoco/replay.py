@@ -150,7 +150,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
         # RK4 calls this at the start of a step, twice in its middle, and at its end.
         data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
 
-    with _callback_lent(mujoco):
+    with callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -167,7 +167,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
 
 
 @contextlib.contextmanager
-def _callback_lent(mujoco: Any) -> Iterator[None]:
+def callback_lent(mujoco: Any) -> Iterator[None]:
     # MuJoCo has one control callback for the process, and calls it even while it compiles a model.
     with _LENT:
         before = mujoco.get_mjcb_control()
@@ -192,7 +192,7 @@ def _played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> Pla
 def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:
     """Difference between tensions of a motion and those that MuJoCo's inverse dynamics requires along its path."""
     mujoco = need_mujoco()
-    with _callback_lent(mujoco):
+    with callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
     # The pulleys are placed in the planes of their cables, so that constraints for that are not needed.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY

@@ -173,6 +173,14 @@ def cable_lengths(winches: Winches, angles: Float[Array, "n"]) -> Float[Array, "
     return layers.cable_length - _wound(winches, layers, full) - rest
 
 
+def layer_ends(winches: Winches, layers: Layers) -> Float[np.ndarray, "k n"]:
+    """Lengths at which layers are full, from the empty drum to the cable's end, in descending order."""
+    growth, radius, total = (np.asarray(x) for x in (layers.growth, winches.drum_radius, layers.cable_length))
+    turn, first = 2.0 * np.pi * np.asarray(layers.turns), radius - 0.5 * growth
+    most = np.ceil((np.sqrt(first**2 + 2.0 * growth * total / turn) - first) / growth).max()
+    return total - np.asarray(_wound(winches, layers, np.arange(most + 2.0)[:, None]))
+
+
 def torques(
     winches: Winches,
     radius: Float[Array, "n"],
