@@ -63,7 +63,7 @@ class Simulation(simulation.Simulated):
 
 
 @checked()
-def simulate(
+def simulate(  # noqa: PLR0913
     given: PlanOrFile,
     *,
     rate: Positive = DEFAULT.rate,

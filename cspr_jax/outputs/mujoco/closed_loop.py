@@ -24,7 +24,7 @@ from cspr_jax.outputs.mujoco.motion import Played, Suspended
 from cspr_jax.outputs.mujoco.replay import callback_lent
 
 # Steps of the integrator in the period of the fastest oscillation of a cable between its drum and the effector.
-STEPS_A_PERIOD = 60
+STEPS_A_PERIOD = 30
 # Fraction of the speed's last estimate in its next one.
 SMOOTHING = 0.5
 

@@ -168,7 +168,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
 
 @contextlib.contextmanager
 def callback_lent(mujoco: Any) -> Iterator[None]:
-    # MuJoCo has one control callback for the process, and calls it even while it compiles a model.
+    """Lend MuJoCo's control callback, of which a process has one, and which it calls even while it compiles a model."""
     with _LENT:
         before = mujoco.get_mjcb_control()
         mujoco.set_mjcb_control(None)

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -172,7 +173,7 @@ def _drives(winches: Winches, loop: Loop) -> Drives:
         ends = np.asarray(winches.zero_length) + FAR * np.array([[1.0], [-1.0]])
     else:
         ends = layer_ends(winches, winches.layers)
-    angles = -np.asarray(winches.direction) * np.asarray(jax.vmap(partial(motor_angles, winches))(ends))
+    angles = -np.asarray(winches.direction) * np.asarray(jax.vmap(partial(motor_angles, winches))(jnp.asarray(ends)))
     friction, viscous = (loop.friction * np.asarray(x) for x in (winches.friction, winches.viscous_friction))
     inertia, efficiency = np.asarray(winches.motor_inertia), np.asarray(winches.efficiency)
     largest = np.full(len(inertia), np.inf)

@@ -211,7 +211,7 @@ def motor_states(
     return MotorStates(motor_angles(winches, lengths), sign * speed, sign * acceleration, sign * torque, torque * speed)
 
 
-def _wound(winches: Winches, layers: Layers, full: Array) -> Array:
+def _wound(winches: Winches, layers: Layers, full: Any) -> Any:
     # Length of the cable in `full` layers, m.
     return 2.0 * jnp.pi * layers.turns * full * (winches.drum_radius + 0.5 * layers.growth * (full - 1.0))
 

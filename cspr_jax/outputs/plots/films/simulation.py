@@ -58,8 +58,9 @@ def _paths(panel: Axes, simulated: Simulated, j: int) -> None:
 
 def _cables(panel: Axes, time: np.ndarray, planned: np.ndarray, found: np.ndarray, label: str, of_what: str) -> None:
     for k in range(planned.shape[1]):
-        style = line_style(k)
-        panel.plot(time, found[:, k], linewidth=0.8, label=f"{of_what} {k + 1}", **style)
-        panel.plot(time, planned[:, k], linewidth=2.2, alpha=0.35, color=style["color"])
+        colour = line_style(k)["color"]
+        panel.plot(time, found[:, k], linewidth=0.7, alpha=0.75, label=f"{of_what} {k + 1}", color=colour)
+    for k in range(planned.shape[1]):
+        panel.plot(time, planned[:, k], linewidth=0.6, color="black", label="" if k else "planned")
     panel.set_ylabel(label)
-    legend_above(panel, planned.shape[1])
+    legend_above(panel, planned.shape[1] + 1)
