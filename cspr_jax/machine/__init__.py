@@ -6,8 +6,7 @@ workspaces ask for them, too. Sign conventions are those of `robots.model.winche
 
 Files, each importing only from those above it:
 
-    motors         motors of a robot in its states
-    drum_motions   what drums pay out along a motion, with derivatives, and their motors
-    setpoints      the same at the ticks of a clock, along consecutive motions
+    drum_motions         what drums pay out along a motion, with derivatives, and their motors
+    setpoints            the same at the ticks of a clock, along consecutive motions
     forward_kinematics   from lengths to poses
 """

@@ -33,6 +33,7 @@ FUNCTIONS = {
     "plan": ("plan",),
     "check": ("check",),
     "replay": ("replay",),
+    "simulate": ("simulate",),
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
@@ -63,13 +64,17 @@ def test_every_command_has_its_function():
         functions += files if name in ("plan", "check") else []
         functions += [cspr_jax.retime] if name in ("plan", "check") else []
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
+        functions += [cspr_jax.Simulation.plot] if name == "simulate" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
             "merge": {"output": "directory"},
-            "plan": {"output": "path", "mjcf": "path", "animate": "path"},
-            "check": {"output": "path", "mjcf": "path", "animate": "path", "motion": "times", "slower": "slower"},
+            "plan": {"output": "path", "mjcf": "path", "animate": "path", "setpoints": "path"},
+            "check": {
+                **{"output": "path", "mjcf": "path", "animate": "path", "setpoints": "path"},
+                **{"motion": "times", "slower": "slower"},
+            },
         }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"names": "names"} if name == "robots" else {}
