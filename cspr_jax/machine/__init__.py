@@ -9,4 +9,5 @@ Files, each importing only from those above it:
     drum_motions         what drums pay out along a motion, with derivatives, and their motors
     setpoints            the same at the ticks of a clock, along consecutive motions
     forward_kinematics   from lengths to poses
+    motion_frequencies   natural frequencies along motions on elastic cables
 """

@@ -7,7 +7,15 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.peaks import EXTREMES
-from cspr_jax.outputs.plan_report import axes_text, finite, missing, retimed_words, verdict_text
+from cspr_jax.outputs.plan_report import (
+    axes_text,
+    finite,
+    frequency_fields,
+    frequency_words,
+    missing,
+    retimed_words,
+    verdict_text,
+)
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
@@ -48,6 +56,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "tension_margin": float(plan.tension_margin[0]),
         **{row.name: float(getattr(peaks, row.peak)[0]) for row in LIMITS if row.peak},
         "z_lowest": float(peaks.lowest[0]),
+        **frequency_fields(plan, 0),
         "demands": {CRITERIA[flag][0]: row for flag, row in _peaks(plan, case).items()},
         "point": plan.point if plan.robot_file.is_platform else None,
         "interpolation": getattr(_motion(plan) or plan.keys, "interpolation", "function"),
@@ -129,7 +138,7 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     answers, case = plan.answers, shown_proof(plan)
     duration = float(answers.duration[0])
     lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; {axes_text(plan)}"]
-    lines += _retimed(plan)
+    lines += _retimed(plan) + list(filter(None, [frequency_words(plan)]))
     if plan.feasible:
         text = "feasible: every criterion is proved to hold at every time"
         stands = float(answers.tolerated[0])

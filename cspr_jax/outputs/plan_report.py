@@ -91,10 +91,29 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(peaks.lowest[i]),
         **{row.name: float(getattr(peaks, row.peak)[i]) for row in LIMITS if row.peak},
+        **frequency_fields(plan, i),
         "samples": int(peaks.samples[i]),
     }
     of_some = dict.fromkeys(name for name in SEGMENT if name not in (*fields, *_OF_DETAILS))
     return fields | of_some | plan.details(i)
+
+
+def frequency_fields(plan: PlannedMotions, i: int) -> dict[str, float]:
+    """Lowest natural frequency of a segment, and its time."""
+    lowest = None if plan.frequencies is None else plan.frequencies[i]
+    values = (math.nan, math.nan) if lowest is None else (lowest.lowest, lowest.t)
+    return dict(zip(("natural_frequency_min", "natural_frequency_t"), values, strict=True))
+
+
+def frequency_words(plan: PlannedMotions) -> str:
+    """Lowest natural frequency of a plan, in words; empty on cables that do not stretch."""
+    known = [(row.lowest, row.t, i) for i, row in enumerate(plan.frequencies or ()) if math.isfinite(row.lowest)]
+    if not known:
+        return ""
+    lowest, t, i = min(known)
+    of_segment = f" of the segment to {i + 1}" if len(plan.frequencies or ()) > 1 else ""
+    hertz = two_digits(lowest / (2.0 * math.pi))
+    return f"elastic cables: lowest natural frequency {lowest:.4g} rad/s ({hertz} Hz) at t = {t:.4g} s{of_segment}"
 
 
 def finite(value: Any) -> Any:
@@ -246,7 +265,8 @@ def _caption(plan: PlannedMotions) -> str:
     note = "; in brackets: none found, the numbers are those of the motion that comes nearest" if numbered else ""
     planned = [plan.details(i).get("planned_duration", math.nan) for i in range(len(plan.answers.duration))]
     retimed = f"\n{retimed_words(sum(planned), time)}" if math.isfinite(sum(planned) + time) else ""
-    return f"{total}{note}{retimed}{_causes(plan)}"
+    elastic = "".join(f"\n{words}" for words in filter(None, [frequency_words(plan)]))
+    return f"{total}{note}{retimed}{elastic}{_causes(plan)}"
 
 
 def retimed_words(before: float, after: float) -> str:

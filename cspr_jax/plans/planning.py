@@ -15,6 +15,7 @@ from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
+from cspr_jax.machine.motion_frequencies import MotionFrequencies
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import JoinedLeg, LegResult
@@ -24,6 +25,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
+from cspr_jax.plans.elastic_cables import frequency_warnings, segment_frequencies
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -66,6 +68,7 @@ class PlannedMotions:
         warnings: what the user should know, one line each.
         text: text of the plan file; empty for a plan without a file.
         point: point of the platform whose positions files and pictures hold, one of `config.motions.table.POINTS`.
+        frequencies: natural frequencies along the n segments; None on cables that do not stretch.
     """
 
     robot_file: RobotFile
@@ -81,6 +84,7 @@ class PlannedMotions:
     warnings: tuple[str, ...] = ()
     text: str = ""
     point: str = "mass-centre"
+    frequencies: tuple[MotionFrequencies, ...] | None = None
 
     @property
     def is_at_origin(self) -> bool:
@@ -171,7 +175,8 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     frame = sequence.waypoints.frame
     legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
     why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
-    lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
+    frequencies = segment_frequencies(problem, robot_file, frame, legs, plan_file, z0)
+    lines = [line for leg in sequence.legs for line in leg.warnings(problem)] + frequency_warnings(frequencies)
     lines += nearly_resting(sequence.waypoints, z0) + _renumbered(robot_file)
     lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
     return PlannedMotions(
@@ -187,6 +192,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
         causes=why,
         warnings=tuple(dict.fromkeys(lines)),
         point=_point(plan_file, sequence),
+        frequencies=frequencies,
     )
 
 
@@ -220,9 +226,11 @@ def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], 
     """A plan with other motions between its poses."""
     legs = (JoinedLeg(plan.keys.family, answers, motions),)
     why, extremes = _causes(plan.frame, legs), _extremes(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
-    lines = [*plan.warnings, *lines, *_missed(plan.keys, answers.feasible, extremes)]
-    warnings = tuple(dict.fromkeys(lines))
-    return dataclasses.replace(plan, legs=legs, demands=extremes, causes=why, warnings=warnings)
+    frequencies = segment_frequencies(plan.problem, plan.robot_file, plan.frame, legs, plan.keys, plan.z0)
+    kept = [line for line in plan.warnings if line not in frequency_warnings(plan.frequencies)]
+    lines = [*kept, *lines, *frequency_warnings(frequencies), *_missed(plan.keys, answers.feasible, extremes)]
+    changes: dict[str, Any] = {"legs": legs, "demands": extremes, "causes": why, "frequencies": frequencies}
+    return dataclasses.replace(plan, warnings=tuple(dict.fromkeys(lines)), **changes)
 
 
 def _causes(frame: Frame, legs: tuple[JoinedLeg, ...]) -> tuple[tuple[Cause, ...], ...]:

@@ -59,7 +59,7 @@ AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
 LIMITED = ("floor_margin", "length_margin", "speed_margin")
 MORE_OF_WORKSPACES = (
     *AMONG_OBSTACLES,
-    *("clearance_platform", *LIMITED, "capacity_margin", "cell_open", "worst_cable"),
+    *("clearance_platform", *LIMITED, "capacity_margin", "cell_open", "worst_cable", "natural_frequency_min"),
 )
 _SUPPLIED = ("workspace.conditions.static", "workspace.conditions.wrench-feasible")
 _FREE = "workspace.conditions.interference-free"
@@ -77,6 +77,7 @@ WORKSPACES_ONLY_WITH = (
     (("cell_side", "cell_open"), ("workspace.prove",)),
     (("orientation_fraction",), ("workspace.orientations",)),
     (("worst_cable",), ("without.any-one",)),
+    (("natural_frequency_min",), ("robot.axial_stiffness",)),
 )
 OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
 

@@ -24,6 +24,12 @@ _WITHOUT = {
 _EXTREMES = {
     **{row.name: (row.unit.replace("/s", " s-1").replace("-1^", "-"), row.extreme) for row in LIMITS if row.peak},
     "z_lowest": ("m", "z of the lowest point, of all of a platform: mass centre, attachment points, shape."),
+    "natural_frequency_min": (
+        "rad s-1",
+        "Lowest natural frequency on elastic cables, with the tensions of the motion; 0 where it is not stable, null "
+        "without `axial_stiffness` or where a cable is not taut.",
+    ),
+    "natural_frequency_t": ("s", "Time after the start of the segment at which it is the lowest."),
 }
 PLAN_OBJECT = {
     "schema": ("1", "Version of these fields."),

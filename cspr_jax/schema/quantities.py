@@ -705,6 +705,14 @@ QUANTITIES = {
             better="larger",
         ),
         Quantity(
+            "natural_frequency_min",
+            "rad s-1",
+            "lowest natural frequency",
+            "Lowest natural frequency at rest on elastic cables, with the most central tensions where cables are "
+            "redundant; 0 where the equilibrium is not stable, NaN where a cable is slack.",
+            better="larger",
+        ),
+        Quantity(
             "capacity_margin",
             "N",
             "capacity margin",

@@ -96,6 +96,8 @@ def is_asked(spec: SweepFile, robot: RobotFile, name: str) -> bool:
         return is_given(spec, name)
     if table == "workspace.conditions":
         return last in (spec.workspace or WorkspaceTable()).conditions
+    if table == "robot":
+        return getattr(robot, last) is not None
     if table == "limits" and getattr(robot, last, None) is not None:
         return True
     return is_given(spec, name) and getattr(getattr(spec, table) if table else spec, last) is not False

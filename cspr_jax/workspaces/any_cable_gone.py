@@ -15,7 +15,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import conjunction
-from cspr_jax.workspaces.map import MARGINS, WorkspaceMap
+from cspr_jax.workspaces.map import FREQUENCY, MARGINS, WorkspaceMap
 
 INSIDE, OUTSIDE = 1, 2  # sides of proved cells, as in `schema.meanings.CELL_SIDES`
 
@@ -46,6 +46,8 @@ class AnyCableGone(GridMap):
         columns = {name: np.stack([answers[name] for answers in each]) for name in each[0]}
         count = columns["verdict"].shape[1]
         answers = {name: np.fmin.reduce(columns[name]) for name in MARGINS}
+        # NaN where a cable is slack without one.
+        answers[FREQUENCY] = np.minimum.reduce(columns[FREQUENCY])
         answers["orientation_fraction"] = columns["orientation_fraction"].min(0)
         answers["verdict"] = conjunction(np.bitwise_or.reduce(columns["verdict"]))
         asked = next((columns[name] for name in MARGINS if not np.isnan(columns[name]).all()), None)

@@ -28,7 +28,7 @@ from cspr_jax.workspaces.cells.speeds import CableSpeeds, cable_speeds
 from cspr_jax.workspaces.requirements import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.static_cells import RestCells
-from cspr_jax.workspaces.static_poses import MARGINS, OrientationSet, RestPoses, over_orientations
+from cspr_jax.workspaces.static_poses import FREQUENCY, MARGINS, OrientationSet, RestPoses, over_orientations
 
 INTERFERENCE = "interference-free"
 TENSIONS = ("tension_min", "tension_max")
@@ -70,7 +70,8 @@ class WorkspaceMap(GridMap):
             raise ConfigError(file, f"workspace.{error}") from error
         around, speeds = self._around(robot_file), self._speeds(robot_file)
         is_centre = self._workspace.point == "mass-centre"
-        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre)
+        is_elastic = FREQUENCY in (spec.run.store or ())
+        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre, is_elastic)
         self._cells = None
         if self._workspace.prove or all_robots is not None:
             self._cells = RestCells(self._poses, self._quaternion[0], all_robots)

@@ -14,6 +14,7 @@ from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import shape_corners
+from cspr_jax.robots.elasticity.natural_frequencies import modes_in, rest_poses
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -31,6 +32,7 @@ MARGINS = (
     *("clearance", *CLEARANCES, "floor_margin", "length_margin", "speed_margin"),
 )
 NEAREST = "nearest_bodies"
+FREQUENCY = "natural_frequency_min"
 BATCH = 4096
 # Number of poses that are tested at a time where each position has many orientations.
 AT_ONCE = 1 << 19
@@ -51,6 +53,7 @@ class RestPoses:
         speeds: required velocities of the effector; None: speeds do not count.
         capacity: search for the capacity margin, which does not affect verdicts; None: it is not requested.
         of_mass_centre: whether positions are of the mass centre instead of the origin of the platform frame.
+        elastic: whether natural frequencies on elastic cables are requested; they do not affect verdicts.
     """
 
     robot: AnyRobot
@@ -60,6 +63,7 @@ class RestPoses:
     speeds: CableSpeeds | None = None
     capacity: WorkspaceSearch | None = None
     of_mass_centre: bool = False
+    elastic: bool = False
 
     def origins(
         self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
@@ -82,6 +86,7 @@ class RestPoses:
             columns[name] = np.fmin(columns[name], answers.margin)
         if self.capacity is not None:
             columns["capacity_margin"] = self.capacity(centres, quaternions).margin
+        columns[FREQUENCY] = self._lowest_frequencies(centres, quaternions)
         columns[NEAREST] = np.zeros(count, np.int16)
         if self.around is not None:
             distances = at_rest(self.robot, self.around, centres, quaternions)
@@ -92,6 +97,12 @@ class RestPoses:
             verdict |= np.where((slack < -missed).any(1), flag, 0).astype(FLAGS)
             columns[name] = slack.min(1)
         return {"verdict": conjunction(verdict), **columns}
+
+    def _lowest_frequencies(self, centres: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        if not self.elastic:
+            return np.full(len(centres), np.nan)
+        states, tensions = rest_poses(self.robot, centres, quaternions, self.limits)
+        return modes_in(self.robot, states, tensions).frequencies[:, 0]
 
     def _lengths(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         poses = positions, quaternions
@@ -158,7 +169,7 @@ def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationS
         may_be = ~is_met & (inside | is_open).all(1)
     # A refuted set gets the reasons of its refuted orientations, even if other orientations are open.
     reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
-    best_values = {name: best(columns[name], axis=1) for name in MARGINS}
+    best_values = {name: best(columns[name], axis=1) for name in (*MARGINS, FREQUENCY) if name in columns}
     at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)
     best_values[NEAREST] = columns[NEAREST][np.arange(len(at)), at]
     return {"verdict": reasons.astype(FLAGS), **best_values, "orientation_fraction": inside @ volume}

@@ -24,7 +24,9 @@ NAME = Path("motion")
 def robot_table(robot: AnyRobot) -> dict[str, Any]:
     """Keys of the robot file of a robot made in Python."""
     table: dict[str, Any] = {"name": robot.name or "robot", "pattern": robot.pattern, "z_axis": robot.z_axis}
-    table |= {name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter")}
+    table |= {
+        name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter", "axial_stiffness")
+    }
     if isinstance(robot, PlatformRobot):
         table |= {name: getattr(robot, name) for name in ("platform_points", "inertia", "centre_of_mass")}
         if robot.centre_of_mass is not None and not PATTERNS[robot.pattern].is_jointed:

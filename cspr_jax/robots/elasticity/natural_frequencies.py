@@ -67,6 +67,12 @@ def rest_poses(
     return found
 
 
+def tensions_in(robot: AnyRobot, states: State, limits: Limits, rule: str = CENTRED) -> Float[np.ndarray, "n n_cables"]:
+    """Tensions that move a robot through n states."""
+    kernel = partial(_tensions, robot, Limits(*tension_range(robot, limits)), rule=rule)
+    return in_batches(kernel, states, batch_size=BATCH)
+
+
 def stiffnesses(
     robot: AnyRobot, states: State, tensions: Float[np.ndarray, "n n_cables"]
 ) -> tuple[Stiffness, Float[np.ndarray, "n dof 6"]]:
@@ -106,6 +112,11 @@ def _at_rest(robot: AnyRobot, limits: Limits, poses: tuple[Array, Array], *, rul
         return state, jnp.where(balanced, tensions, jnp.nan)
 
     return jax.vmap(one)(*poses)
+
+
+@partial(jax.jit, static_argnames=("rule",))
+def _tensions(robot: AnyRobot, limits: Limits, states: State, *, rule: str) -> Array:
+    return jax.vmap(lambda state: cables.tensions(robot, state, limits, rule))(states)
 
 
 @jax.jit
