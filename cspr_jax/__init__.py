@@ -64,6 +64,7 @@ _MODULES = {
     "point_mass": "api.robots",
     "point_mass_robot": "api.robots",
     "replay": "api.files.replays",
+    "replay_elastic": "api.files.replays",
     "report": "api.files.reports",
     "retime": "api.retiming",
     "run": "api.sweeps",

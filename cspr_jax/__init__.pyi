@@ -41,6 +41,7 @@ from cspr_jax.api.files.published import list_tables as list_tables
 from cspr_jax.api.files.published import table as table
 from cspr_jax.api.files.replays import Replay as Replay
 from cspr_jax.api.files.replays import replay as replay
+from cspr_jax.api.files.replays import replay_elastic as replay_elastic
 from cspr_jax.api.files.reports import report as report
 from cspr_jax.api.files.simulations import Simulation as Simulation
 from cspr_jax.api.files.simulations import simulate as simulate

@@ -146,13 +146,15 @@ class Plan(Displayed, planning.PlannedMotions):
         return Path(path)
 
     @checked()
-    def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False) -> Path:
+    def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False, elastic: bool = False) -> Path:
         """Write a model of the robot for MuJoCo, and beside it NAME_control.csv, the tensions that play the plan.
 
         Args:
             path: model to write, NAME.xml; existing files of both names are replaced.
             step: longest step of MuJoCo's integrator, s.
             anyway: whether to write a plan even if it is not feasible; cables of the model never push.
+            elastic: whether cables are springs, by `axial_stiffness` and `axial_damping` of the robot file; the control
+                file then has their unstretched lengths.
 
         Returns:
             the path.
@@ -170,7 +172,7 @@ class Plan(Displayed, planning.PlannedMotions):
         with double_precision():
             from cspr_jax.outputs.mujoco.mjcf import write_mjcf
 
-            write_mjcf(self, path, step)
+            write_mjcf(self, path, step, elastic=elastic)
         return path
 
     @checked()

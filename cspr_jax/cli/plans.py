@@ -93,6 +93,11 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
         help="write a model for MuJoCo, and beside it FILE_control.csv, the tensions that move it along the plan",
     )
     parser.add_argument("--step", type=float, metavar="S", help=f"--mjcf: {_STEP}")
+    parser.add_argument(
+        "--elastic",
+        action="store_true",
+        help="--mjcf: cables are springs, by axial_stiffness of the robot; FILE_control.csv has unstretched lengths",
+    )
     parser.add_argument("--animate", type=Path, metavar="FILE", help="write a film: .gif, .mp4 or .html")
     parser.add_argument(
         "--speed", type=float, metavar="X", help="--animate: playback speed relative to real time (default 1)"
@@ -131,6 +136,8 @@ def check_files(options: argparse.Namespace) -> None:
         raise ConfigError("--speed", f"{options.speed}: must be a number > 0")
     if options.step is not None and options.mjcf is None:
         raise ConfigError("--step", "must be absent without --mjcf")
+    if options.elastic and options.mjcf is None:
+        raise ConfigError("--elastic", "must be absent without --mjcf")
     _check_step(options)
     has_rows = options.json and options.rate is not None and options.setpoints is None
     if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
@@ -217,7 +224,7 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
 
 def write_files(plan: Any, options: argparse.Namespace) -> None:
     """Write the files that options name; if the motion is not feasible, only with --anyway."""
-    of_mjcf = {} if options.step is None else {"step": options.step}
+    of_mjcf = {"elastic": options.elastic} | ({} if options.step is None else {"step": options.step})
     if options.setpoints is not None and plan.feasible:
         with waiting():
             plan.save_setpoints(options.setpoints, options.rate or USUAL_RATE)
@@ -264,6 +271,12 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
         "--anyway", action="store_true", help="play the best candidate's motion even if it is not feasible"
     )
     parser.add_argument("--step", type=float, metavar="S", help=_STEP)
+    parser.add_argument(
+        "--elastic",
+        action="store_true",
+        help="play it on elastic cables (axial_stiffness) by drums that set lengths, with and without compensation of "
+        "the stretch, and say how far off the plan it comes",
+    )
     add_style(parser)
     add_all_errors(parser)
     add_device(parser)
@@ -272,6 +285,8 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
 def _replay(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
+    if options.output is not None and options.elastic:
+        raise ConfigError("-o", "must be absent with --elastic, which has no picture")
     _check_step(options)
     check_writable(options.output)
     from cspr_jax.outputs.mujoco.module import need_mujoco
@@ -285,9 +300,13 @@ def _replay(options: argparse.Namespace) -> int:
         warn(f"{options.plan}: not played, since a segment is not proved feasible (--anyway plays it)")
         return ExitCode.NOT_FEASIBLE
     with waiting():
-        from cspr_jax.api.files.replays import replay
+        from cspr_jax.api.files.replays import replay, replay_elastic
 
-        played = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
+        of_step = {} if options.step is None else {"step": options.step}
+        if options.elastic:
+            played: Any = replay_elastic(plan, anyway=True, **of_step)
+        else:
+            played = replay(plan, anyway=True, **of_step)
         if options.output is not None:
             played.plot(output=options.output, **style)
     if options.json:

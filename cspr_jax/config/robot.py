@@ -96,6 +96,11 @@ class RobotFile(LimitKeys):
         description="axial stiffness EA of the cables, the tension that would double a length, one number, or one per "
         "cable, N; absent: cables do not stretch",
     )
+    axial_damping: Annotated[float, Field(ge=0, le=1e12)] | None = Field(
+        None,
+        description="damping of elastic cables, their tension over the rate of their strain, N s; only models and "
+        "simulations for MuJoCo have it (default 0)",
+    )
     winch: WinchTable | None = Field(None, description="winches of the cables")
     _notes: tuple[str, ...] = PrivateAttr(())  # about items of a file of another program
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
@@ -260,6 +265,8 @@ class RobotFile(LimitKeys):
         stiffness = self.axial_stiffness
         if isinstance(stiffness, list) and len(stiffness) != count:
             raise table_error("axial_stiffness", stiffness, f"a number > 0, or {count}: one a cable")
+        if self.axial_damping is not None and stiffness is None:
+            raise table_error("axial_damping", self.axial_damping, "absent without axial_stiffness")
         if self.winch is not None:
             self.winch.check_count(count)
             if self.winch.has_layers and not self.cable_diameter:

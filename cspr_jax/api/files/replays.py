@@ -17,7 +17,9 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.errors.arguments import Kind, PictureSize
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.mujoco import elastic_replay
 from cspr_jax.outputs.mujoco import replay as replays
+from cspr_jax.outputs.mujoco.elastic_replay import ElasticPlan
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.outputs.plots.films.replay import replay_figure
@@ -90,3 +92,28 @@ def replay(given: PlanOrFile, *, step: float = STEP, anyway: bool = False) -> Re
     with double_precision():
         played = replays.replay(planned, step)
     return Replay(**{field.name: getattr(played, field.name) for field in dataclasses.fields(played)})
+
+
+@checked()
+def replay_elastic(given: PlanOrFile, *, step: float = STEP, anyway: bool = False) -> ElasticPlan:
+    """Play a plan in MuJoCo on elastic cables, by drums that set lengths, with and without compensation of the stretch.
+
+    Args:
+        given: a plan, a plan file, or a dictionary, as for `plan`, of a robot with `axial_stiffness`.
+        step: longest step of MuJoCo's integrator, RK4, s; shorter ones are taken where natural frequencies are high.
+        anyway: whether to play a plan even if it is not feasible; cables never push.
+
+    Returns:
+        both paths, and how far they are off the plan.
+
+    Raises:
+        ConfigError: MuJoCo is not installed; the plan has a mistake, is not feasible or has no finite motion; its robot
+            has no `axial_stiffness`, or is a platform that only translates; without compensation a cable is slack at
+            the start; or the step is not positive or gives too many rows.
+    """
+    need_mujoco()
+    planned = given if isinstance(given, Plan) else plan(given)
+    if not (planned.feasible or anyway):
+        raise ConfigError(NAME, "not played, since a segment is not proved feasible (anyway=True plays it)")
+    with double_precision():
+        return elastic_replay.replay_elastic(planned, step)

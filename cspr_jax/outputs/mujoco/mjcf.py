@@ -4,6 +4,8 @@ These files are written without MuJoCo. The control file has the rows of `output
 step, and one more with the time of the row before where the acceleration jumps.
 """
 
+from __future__ import annotations
+
 import csv
 import io
 import math
@@ -18,8 +20,10 @@ from scipy.spatial.transform import Rotation
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, printable
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.mujoco.motion import STEP, Played, Suspended, attachments, coordinates, played, suspended
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.elasticity.springs import unstretched_lengths
 from cspr_jax.robots.model.pulleys import exits
 from cspr_jax.robots.model.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere
 from cspr_jax.store.files.disk import Disk
@@ -48,13 +52,17 @@ ORANGE = (0.85, 0.45, 0.1, 1.0)
 BROWN = (0.36, 0.24, 0.18, 0.6)
 GLASS = (0.85, 0.45, 0.1, 0.35)
 HULL = "platform_hull"
+SPRINGS = "the control file has unstretched lengths, m, for tendon_lengthspring, and EA / length is tendon_stiffness"
 
 
-def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
-    """A model of a robot for MuJoCo."""
+def model_xml(
+    body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "", *, elastic: bool = False
+) -> str:
+    """A model of a robot for MuJoCo; elastic cables are springs, whose unstretched lengths are those of the start."""
     root = ElementTree.Element("mujoco", model=printable(body.name))
     rotated = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
-    words = f"World axes are those of the robot file{rotated}; z is up. A control is the tension of a cable, N."
+    words = f"World axes are those of the robot file{rotated}; z is up. A control is the tension of a cable, N"
+    words += f", beside that of its spring: {SPRINGS}." if elastic else "."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     # Make the Jacobian of the tendons dense, with a row for each cable. Constraints make pulleys follow their cables.
@@ -74,12 +82,12 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
         _add(assets, "mesh", name=HULL, vertex=np.unique(body.body.triangles.reshape(-1, 3), axis=0))
     _world(_add(root, "worldbody"), body, moved, extent)
     tendons = _add(root, "tendon")
-    _cables(tendons, body, extent)
+    _cables(tendons, body, extent, _springs(body, moved) if elastic else None)
     if len(body.wheels):
         _followers(tendons, _add(root, "equality"), body, step)
     _motors(_add(root, "actuator"), body, moved)
     qpos, qvel, _ = (rows[0] for rows in coordinates(body, moved))
-    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=qpos, qvel=qvel, ctrl=moved.tension[0])
+    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=qpos, qvel=qvel, ctrl=moved.tension[0] * (not elastic))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -191,11 +199,23 @@ def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:
     return moments, Rotation.from_matrix(axes * np.linalg.det(axes))
 
 
-def _cables(tendons: ElementTree.Element, body: Suspended, extent: float) -> None:
+def _springs(body: Suspended, moved: Played) -> list[dict[str, Any]]:
+    # Attributes of tendons: without force where they are shorter than unstretched.
+    unstretched = unstretched_of(body, moved)[0]
+    stiffness, damping = body.axial_stiffness / unstretched, body.axial_damping / unstretched
+    longest = unstretched + leads(body)
+    return [
+        {"stiffness": k, "damping": c, "springlength": [0.0, end]}
+        for k, c, end in zip(stiffness, damping, longest, strict=True)
+    ]
+
+
+def _cables(tendons: ElementTree.Element, body: Suspended, extent: float, springs: list[dict[str, Any]] | None) -> None:
     diameter = body.cable_diameter
     radius = CABLE_RADIUS * extent if diameter is None else max(0.5 * diameter, THINNEST * extent)
     for k in range(1, len(body.spools) + 1):
-        cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE)
+        spring = {} if springs is None else springs[k - 1]
+        cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE, **spring)
         _add(cable, "site", site=f"spool_{k}")
         if k - 1 in body.wheels:
             _add(cable, "geom", geom=f"wheel_{k}", sidesite=f"side_{k}")
@@ -222,19 +242,42 @@ def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> N
         _add(actuators, "motor", name=f"tension_{k}", tendon=f"cable_{k}", gear=-1.0, **limits)
 
 
+def leads(body: Suspended) -> Float[np.ndarray, "n_cables"]:
+    """Lengths of MuJoCo's tendons before the points at which cables enter their pulleys, m."""
+    none = np.zeros(len(body.spools))
+    return none if body.pulleys is None else LEAD * np.asarray(body.pulleys.radius)
+
+
+def unstretched_of(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:
+    """Unstretched lengths of elastic cables, from lengths and tensions of a motion, m."""
+    return np.asarray(unstretched_lengths(moved.length, moved.tension, body.axial_stiffness))  # type: ignore[arg-type]
+
+
 def control_file_of(path: Path) -> Path:
     """Control file beside a model."""
     return path.with_name(f"{path.stem}_control.csv")
 
 
-def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
+def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP, *, elastic: bool = False) -> None:
     """Write a model of a plan's robot, and beside it the control file that plays the plan."""
+    body = suspended(plan)
+    if elastic:
+        check_elastic(plan, body)
     moved, beside = played(plan, step), control_file_of(path)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["t", *(f"tension_{k + 1}" for k in range(moved.tension.shape[1]))])
-    writer.writerows([map(repr, row) for row in np.column_stack([moved.time, moved.tension]).tolist()])
+    name, values = ("length", unstretched_of(body, moved)) if elastic else ("tension", moved.tension)
+    writer.writerow(["t", *(f"{name}_{k + 1}" for k in range(values.shape[1]))])
+    writer.writerows([map(repr, row) for row in np.column_stack([moved.time, values]).tolist()])
     note = "" if plan.feasible else " The plan is NOT PROVED FEASIBLE; no cable of the model pushes."
     # Write the control file before the model that names it.
     publish(Disk(), beside, text.getvalue().encode())
-    publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name, note).encode())
+    publish(Disk(), path, model_xml(body, moved, step, beside.name, note, elastic=elastic).encode())
+
+
+def check_elastic(plan: PlannedMotions, body: Suspended) -> None:
+    """Refuse robots whose cables do not stretch, or turn the effector although it only translates here."""
+    if body.axial_stiffness is None:
+        raise ConfigError("--elastic", "must be absent for a robot without axial_stiffness")
+    if plan.robot_file.pairs is not None:
+        raise ConfigError("--elastic", "must be absent for a platform that only translates: elastic cables let it turn")

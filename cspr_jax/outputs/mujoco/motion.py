@@ -52,6 +52,8 @@ class Suspended(NamedTuple):
         obstacles: bodies fixed in space.
         body: shape of the platform in body axes, from the mass centre; None: not known.
         pulleys: pulleys, with MuJoCo's axes; None: cables leave from points.
+        axial_stiffness: (n_cables,) EA of the cables, N; None: they do not stretch.
+        axial_damping: tension over rate of strain, N s.
     """
 
     name: str
@@ -67,6 +69,8 @@ class Suspended(NamedTuple):
     obstacles: tuple[Obstacle, ...] = ()
     body: Body | None = None
     pulleys: Pulleys | None = None
+    axial_stiffness: np.ndarray | None = None
+    axial_damping: float = 0.0
 
     @property
     def wheels(self) -> np.ndarray:
@@ -88,6 +92,7 @@ class Played:
         rotation: n rotations from body to world axes; None for an effector that does not turn.
         omega: (n, 3) angular velocity in body axes, rad/s; None likewise.
         omega_dot: (n, 3) its derivative, rad/s^2; None likewise.
+        length: (n, n_cables) lengths of the cables, m; None: not known.
     """
 
     time: np.ndarray
@@ -99,6 +104,7 @@ class Played:
     rotation: "Rotation | None" = None
     omega: np.ndarray | None = None
     omega_dot: np.ndarray | None = None
+    length: np.ndarray | None = None
 
     def runs(self) -> list[range]:
         """Runs of steps without a jump."""
@@ -149,6 +155,10 @@ def suspended(plan: PlannedMotions) -> Suspended:
         tension_max=np.broadcast_to(np.asarray(limit, float), len(points)),
         cable_diameter=None if robot.cable_diameter is None else float(robot.cable_diameter),
         pulleys=pulleys,
+        axial_stiffness=None
+        if written.axial_stiffness is None
+        else np.broadcast_to(np.asarray(written.axial_stiffness, float), (len(points),)),
+        axial_damping=written.axial_damping or 0.0,
         obstacles=tuple(inward(table.shape(), world) for table in plan.keys.obstacle or ()),
         body=_body(plan, points),
     )
@@ -224,6 +234,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
         # The derivative of omega is the same in rotating axes, since omega x omega is zero.
         moved |= {name: back.apply(world.rotated(columns[name])) for name in ("omega", "omega_dot")}
         moved["rotation"] = rotation
+    moved["length"] = columns.get("length")
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 
 

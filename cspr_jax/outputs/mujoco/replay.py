@@ -163,7 +163,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
                 data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
                 mujoco.mj_step(model, data)
                 reached.append(data.qpos.copy())
-    return _played_path(moved, np.array(reached), body.axes)
+    return played_path(moved, np.array(reached), body.axes)
 
 
 @contextlib.contextmanager
@@ -178,7 +178,8 @@ def callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def _played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+def played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+    """Path of the effector from the coordinates at the ends of all steps."""
     rows = ends_of_steps(moved)
     position, rotated = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:

@@ -94,10 +94,15 @@ def mass_matrix(robot: AnyRobot, state: State) -> Float[Array, "dof dof"]:
     return jax.jacfwd(supplied)(jnp.zeros(robot.dof))
 
 
+def pose_lengths(robot: AnyRobot, state: State) -> Float[Array, "n_cables"]:
+    """Lengths of the cables, with what is wrapped around pulleys."""
+    return cable_motion(robot, _moving(state, jnp.zeros(6)))[0]
+
+
 def stiffness_at(robot: AnyRobot, state: State, tensions: Float[Array, "n_cables"]) -> Stiffness:
     """Stiffness and mass matrix of a robot with an axial stiffness, cables under some tensions."""
     columns = robot.wrench_matrix(state)
-    lengths = cable_motion(robot, _moving(state, jnp.zeros(6)))[0]
+    lengths = pose_lengths(robot, state)
     springs = spring_constants(jnp.asarray(robot.axial_stiffness), lengths, tensions)
     geometric = jnp.sum(tensions[:, None, None] * length_curvatures(robot, state), axis=0)
     elastic = (columns * springs[None]) @ columns.T
