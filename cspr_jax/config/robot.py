@@ -208,7 +208,7 @@ class RobotFile(LimitKeys):
     @property
     def settings(self) -> dict[str, Any]:
         """Plain values on which motions depend: keys of the file, and translation_only of an equivalent."""
-        return (self._whole or self.as_written).model_dump(mode="json", exclude_none=True)
+        return self.whole.model_dump(mode="json", exclude_none=True)
 
     def as_remaining(self, whole: "RobotFile", kept: list[int]) -> "RobotFile":
         """This robot as what is left of another one that has lost cables."""
@@ -229,6 +229,11 @@ class RobotFile(LimitKeys):
                     raise InputError(row.name, value, f"{row.allowed}, or {count}: one a cable")
                 own[row.name] = [value[i] for i in self._kept]
         return own
+
+    @property
+    def whole(self) -> "RobotFile":
+        """The robot of the file, with all its cables."""
+        return self._whole or self.as_written
 
     @property
     def missing_cables(self) -> tuple[int, ...]:

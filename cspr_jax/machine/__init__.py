@@ -10,4 +10,5 @@ Files, each importing only from those above it:
     setpoints            the same at the ticks of a clock, along consecutive motions
     forward_kinematics   from lengths to poses
     motion_frequencies   natural frequencies along motions on elastic cables
+    stops                proved ways to rest from states of a motion, also when cables break
 """

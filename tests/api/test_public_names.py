@@ -34,6 +34,7 @@ FUNCTIONS = {
     "check": ("check",),
     "replay": ("replay",),
     "simulate": ("simulate",),
+    "stops": ("stops",),
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
@@ -65,6 +66,7 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.retime] if name in ("plan", "check") else []
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
         functions += [cspr_jax.Simulation.plot] if name == "simulate" else []
+        functions += [cspr_jax.Stops.plot] if name == "stops" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {

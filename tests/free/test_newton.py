@@ -250,3 +250,37 @@ def test_starts_are_the_same_for_each_task_and_join_its_poses(searched):
     assert (np.bincount(begun.task) == len(begun.task) // 2).all()
     for side, end in ((0, 0), (1, -1)):
         np.testing.assert_allclose(begun.controls[:, 0, end], single.ends[begun.task, 0, side], atol=1e-9)
+
+
+def test_a_motion_that_rests_anywhere_shifts_its_last_pose():
+    rng = np.random.default_rng(3)
+    with double_precision():
+        problem = problem_of(RING, LIMITS)[0]
+        limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits))
+        places, rates = np.array([[0.3, 0.1, 1.0], [-0.2, 0.3, 1.4]]), np.array([[0.5, -1.0, 0.2], [0.0, 0.0, 0.0]])
+        accelerations = np.array([[1.0, 2.0, -1.0], [0.0, 0.0, 0.0]])
+        poses = FreePoses(places, None, rates, accelerations, 1.2, rests_anywhere=True)
+        tasks = tasks_of(problem, basis(6, 3), limits, OBJECTIVES["time"](limits, 3)[0], poses, None)
+        line = np.linspace(places[0], places[1], tasks.basis.controls)[None, None]
+        unknowns = started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[0.7]]))
+    assert tasks.is_free.tolist() == [[False, True]]
+    np.testing.assert_allclose(unknowns.acceleration[0, 0], accelerations[0])
+    shift = unknowns.acceleration[:, 1:]
+    ends = tasks.basis.evaluate(tasks.controls(unknowns))[0, 0, [0, -1], [0, -1]]
+    time = unknowns.duration[0, 0]
+    np.testing.assert_allclose(ends[:, 0], [places[0], places[1] + shift[0, 0]], atol=1e-12)
+    np.testing.assert_allclose(ends[0, 1:] / [[time], [time**2]], [rates[0], accelerations[0]], atol=1e-9)
+    np.testing.assert_allclose(ends[1, 1:], 0.0, atol=1e-9)
+    # The outer control points have their derivatives, first and second.
+    step = np.array([[0.3]]), np.concatenate([np.zeros((1, 1, 3)), rng.normal(size=(1, 1, 3))], axis=1)
+    by = np.concatenate([step[0][..., None], step[1][:, :1], step[1][:, 1:]], axis=-1)
+
+    def outer(size):
+        return tasks.controls(moved(unknowns, step, size)).reshape(1, 1, -1)[..., tasks.border]
+
+    slopes = times(tasks.border_jacobians(unknowns), by)
+    np.testing.assert_allclose(slopes, (outer(STEP) - outer(-STEP)) / (2.0 * STEP), atol=1e-8)
+    multipliers = rng.normal(size=outer(0.0).shape)
+    bent = np.sum(multipliers * (outer(1.0) - 2.0 * outer(0.0) + outer(-1.0)))
+    hessians = tasks.border_hessians(unknowns, multipliers)
+    np.testing.assert_allclose(np.sum(by * times(hessians, by)), bent, atol=1e-9)

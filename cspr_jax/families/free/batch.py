@@ -1,7 +1,7 @@
 """The fastest motions of many pairs of poses: searched on few intervals, then on many, proved and tightened."""
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from cspr_jax.families.free.problem import FreeQuestion, FreeSettings, planned_p
 from cspr_jax.families.free.proofs import ON, ROUNDS, proved
 from cspr_jax.families.free.search.basis import DEGREE, Basis
 from cspr_jax.families.free.search.interior_point import again, optima, started
+from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
 from cspr_jax.maps.proved_map import CONTACTS
 from cspr_jax.motion.answers import Answers
@@ -44,15 +45,19 @@ class ManyFreeMotions(NamedTuple):
 
 
 def free_motions(
-    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], meshes: Sequence[tuple[int, int]] = MESHES
+    problem: Problem,
+    scene: Scene | None,
+    pairs: Sequence[FreePoses],
+    meshes: Sequence[tuple[int, int]] = MESHES,
+    begin: Callable[[Tasks], Starts] | None = None,
 ) -> ManyFreeMotions:
-    """Search for the fastest motions of many pairs of poses, and prove them."""
+    """Search for the fastest motions of many pairs of poses, and prove them; `begin` replaces the usual starts."""
     questions = [FreeQuestion.of(planned_problem(problem), scene, pair, FreeSettings()) for pair in pairs]
     best = dict[int, tuple[Spline, MotionProof]]()
     sought = [k for k, pair in enumerate(pairs) if not len(divided(problem, pair))]
     for mesh in meshes:
         left = [k for k in sought if k not in best or best[k][1].verdict]
-        for i, motion, proof in _on_mesh([questions[k] for k in left], mesh) if left else ():
+        for i, motion, proof in _on_mesh([questions[k] for k in left], mesh, begin) if left else ():
             if left[i] not in best or not proof.verdict:
                 best[left[i]] = motion, proof
     indices = sorted(best)
@@ -62,14 +67,19 @@ def free_motions(
     return ManyFreeMotions(np.array(indices, int), motions, answers)
 
 
-def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
+def _on_mesh(
+    questions: Sequence[FreeQuestion], mesh: tuple[int, int], begin: Callable[[Tasks], Starts] | None
+) -> Iterator[tuple[int, Spline, MotionProof]]:
     # Return the indices of the pairs with a motion, the motions, and their proofs.
     coarse, fine = (
         _stacked([question.tasks(intervals, samples) for question in questions])
         for intervals, samples in zip(mesh, (FEWEST, SAMPLES), strict=True)
     )
     search = Neighbours(coarse, [question.poses.z0 for question in questions])
-    search.search()
+    if begin is None:
+        search.search()
+    else:
+        search.search_from(begin(coarse))
     solved = np.flatnonzero(np.isfinite(search.duration))
     if not len(solved):
         return

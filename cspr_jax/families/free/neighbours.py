@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from cspr_jax.families.free.search.interior_point import BARRIERS, optima, started
-from cspr_jax.families.free.search.starts import starts
+from cspr_jax.families.free.search.starts import Starts, starts
 from cspr_jax.families.free.search.tasks import Tasks
 
 # Indices of the first starts: a line, and swings of one arc and of two.
@@ -57,6 +57,10 @@ class Neighbours:
         self._from_neighbours()
         if len(self.lacking):
             self._from_starts(self.lacking, others=True)
+
+    def search_from(self, begun: Starts) -> None:
+        """Search from given motions alone."""
+        self._improve(begun.task, begun.controls[:, 0], begun.duration[:, 0], FROM_START)
 
     def _from_starts(self, pairs: np.ndarray, *, others: bool) -> None:
         parts = [starts(self._tasks.take(pairs[i : i + 1]), self._depths[k]) for i, k in enumerate(pairs.tolist())]

@@ -39,10 +39,12 @@ class FreePoses(NamedTuple):
     Fields:
         positions: (k, 3) positions of the mass centre, m.
         quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
-        velocities: (k, 3) m/s; angular velocities are zero.
+        velocities: (k, 3) m/s, angular velocities are zero; or (k, 6) with angular velocities last, rad/s, at poses
+            whose accelerations are free or whose orientation is that of all others.
         accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations last, rad/s^2; a row with NaN is
             free.
         z0: depth of P0, m; searches start from swings about P0.
+        rests_anywhere: whether the motion, of one segment, comes to rest at any pose; the last one is near it.
     """
 
     positions: np.ndarray
@@ -50,6 +52,7 @@ class FreePoses(NamedTuple):
     velocities: np.ndarray
     accelerations: np.ndarray
     z0: float
+    rests_anywhere: bool = False
 
 
 class _Joined(NamedTuple):
@@ -79,7 +82,8 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     ends[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
     turns, references = np.tile(np.eye(d), (count, 2, 1, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     velocities, linear = np.zeros_like(ends), poses.accelerations[:, along]
-    velocities[..., : len(along)] = np.stack([poses.velocities[:-1], poses.velocities[1:]], axis=1)[..., along]
+    rates = np.stack([poses.velocities[:-1], poses.velocities[1:]], axis=1)
+    velocities[..., : len(along)] = rates[..., along]
     if poses.quaternions is None:
         return _Joined(ends, velocities, references, turns, linear)
     start, end = poses.quaternions[:-1], poses.quaternions[1:]
@@ -94,6 +98,9 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
             across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
             to_angular_velocity = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
             turns[i, side, len(along) :, len(along) :] = np.linalg.inv(to_angular_velocity[np.ix_(about, about)])
+        if rates.shape[-1] > 3:
+            turning = turns[:, side, len(along) :, len(along) :] @ rates[:, side, 3 + about, None]
+            velocities[:, side, len(along) :] = turning[..., 0]
     accelerations = np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1)
     return _Joined(ends, velocities, references, turns, accelerations)
 
@@ -145,6 +152,7 @@ def tasks_of(
     """The task of a motion through all poses."""
     ends, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
+    is_free[-1] |= poses.rests_anywhere
     shape = 1, len(ends), *basis.tau.shape, len(bounds.low)
     low, high = (np.broadcast_to(side, shape).copy() for side in (bounds.low, bounds.high))
     if bounds.determinant is not None:
@@ -168,6 +176,7 @@ def tasks_of(
         scale=np.full(1, half_swing(problem, poses)),
         objective=objective,
         longest=None if longest is None else np.asarray(longest, float),
+        rests_anywhere=poses.rests_anywhere,
     )
 
 

@@ -139,6 +139,8 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
 def _fixed_by_poses(tasks: Tasks, limits: ValueBounds) -> Bool[np.ndarray, "l s m n n_values"]:
     # Tell which values poses fix, and no motion changes: there limits may be touched.
     highest = np.where(tasks.is_free, 1, 2)[..., None]
+    if tasks.rests_anywhere:
+        highest[:, -1] = -1
     is_given = np.zeros((*tasks.low.shape[:4], len(limits.orders)), bool)
     is_given[:, :, 0, 0], is_given[:, :, -1, -1] = (limits.orders <= side for side in (highest[:, :-1], highest[:, 1:]))
     return is_given

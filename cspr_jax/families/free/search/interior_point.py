@@ -195,6 +195,8 @@ def started(
         second = step / (tasks.basis.acceleration_step * duration[..., None] ** 2)
         near = np.linalg.solve(tasks.turns[:, :, side], second[..., None])[..., 0]
         is_free = tasks.is_free[:, side : count + side, None]
+        if side and tasks.rests_anywhere:
+            near = controls[:, :, -1] - tasks.ends[:, :, 1]
         acceleration[:, side : count + side] = np.where(is_free, near, acceleration[:, side : count + side])
     shape = tasks.low.shape
     values, empty = np.zeros(shape), np.zeros((*shape[:-1], shape[-1] - cables + dof))

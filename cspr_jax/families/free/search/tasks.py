@@ -1,7 +1,8 @@
 """Motions that are searched for together, and their unknowns: control points, durations, accelerations, levels.
 
 At each end of a segment the motion is at a pose, with a given velocity, and an acceleration that both adjacent segments
-have. So duration and acceleration determine the outer three control points at each end.
+have. So duration and acceleration determine the outer three control points at each end. Where a motion may come to rest
+anywhere, the unknown acceleration at its last pose is the shift of that pose instead: there all accelerations are zero.
 """
 
 from __future__ import annotations
@@ -89,6 +90,7 @@ class Tasks:
         objective: what is minimised.
         longest: () longest duration of a segment, s; None for any.
         planes: clearance planes, whose values come last; None without any.
+        rests_anywhere: whether the motion comes to rest at any pose; `ends` has one near it.
     """
 
     robot: AnyRobot
@@ -106,6 +108,7 @@ class Tasks:
     objective: Objective
     longest: np.ndarray | None = None
     planes: ClearancePlanes | None = None
+    rests_anywhere: bool = False
 
     def take(self, indices: np.ndarray) -> "Tasks":
         """Some of the motions."""
@@ -192,9 +195,9 @@ class Tasks:
 
     @property
     def border(self) -> np.ndarray:
-        """Indices of the outer coordinates that are not fixed, among all K d of a segment, (4 d,)."""
+        """Indices of the outer coordinates that are not fixed, among all K d of a segment, (4 d,) or (5 d,)."""
         d, last = self.ends.shape[-1], self.basis.controls * self.ends.shape[-1]
-        return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
+        return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - (not self.rests_anywhere) * d)])
 
     def controls(self, unknowns: Unknowns) -> np.ndarray:
         """All control points."""
@@ -203,6 +206,8 @@ class Tasks:
         controls[:, :, OUTER:-OUTER] = unknowns.inner
         for side, sign in ((0, 1.0), (1, -1.0)):
             end, step = self.ends[:, :, side], sign * self.basis.velocity_step * time * self.velocities[:, :, side]
+            if side and self.rests_anywhere:
+                end = end + unknowns.acceleration[:, 1:]
             second_derivative = self.basis.acceleration_step * time**2 * self._second(unknowns, side)
             steps = (end, end + step, end + 3.0 * step + second_derivative)
             for k, value in enumerate(steps):
@@ -212,14 +217,18 @@ class Tasks:
     def _second(self, unknowns: Unknowns, side: int) -> np.ndarray:
         # Return second derivatives in time of the coordinates at the start or end of each segment, (l, s, d).
         count = self.ends.shape[1]
+        if side and self.rests_anywhere:
+            return np.zeros_like(self.ends[:, :, side])
         acceleration = unknowns.acceleration[:, side : count + side]
         return (self.turns[:, :, side] @ acceleration[..., None])[..., 0]
 
     def border_jacobians(self, unknowns: Unknowns) -> np.ndarray:
         """Derivatives of the outer coordinates that are not fixed, by the duration and the accelerations."""
         d, time, basis = self.ends.shape[-1], unknowns.duration[..., None], self.basis
-        jacobians = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
-        for side, sign in ((0, 1.0), (1, -1.0)):
+        jacobians = np.zeros((*unknowns.duration.shape, len(self.border), 1 + 2 * d))
+        if self.rests_anywhere:  # the last three control points move with the pose
+            jacobians[:, :, 2 * d :, 1 + d :] = np.tile(np.eye(d), (3, 1))
+        for side, sign in ((0, 1.0), (1, -1.0))[: 1 if self.rests_anywhere else 2]:
             near = slice(0, d) if side == 0 else slice(3 * d, 4 * d)
             far = slice((1 + side) * d, (2 + side) * d)
             step = sign * basis.velocity_step * self.velocities[:, :, side]
@@ -233,7 +242,7 @@ class Tasks:
         """Second derivatives of the same coordinates, times multipliers."""
         d, twice = self.ends.shape[-1], 2.0 * self.basis.acceleration_step
         hessians = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
-        for side in (0, 1):
+        for side in (0,) if self.rests_anywhere else (0, 1):
             along = multipliers[:, :, (1 + side) * d : (2 + side) * d]
             hessians[:, :, 0, 0] += twice * np.sum(along * self._second(unknowns, side), axis=-1)
             mixed = twice * unknowns.duration[..., None] * (along[..., None, :] @ self.turns[:, :, side])[..., 0, :]

@@ -1,0 +1,101 @@
+"""Stops along the path of the motions themselves: run on ever more slowly, or to the next place of rest.
+
+The motion x(s) is run with s' = 1 - (10 u^3 - 15 u^4 + 6 u^5), u = t / T: speed and acceleration go on at the start,
+and after the time T, in which it comes T / 2 further, the robot rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
+from cspr_jax.machine.stops.instants import Instants
+from cspr_jax.numerics.shapes import Float
+
+KNOTS = 41  # of a stop
+SPACING = 0.04  # largest distance of the knots of the planned motion, over half a swing
+TRIED = 12  # durations
+# Durations are tried between these multiples of the time in which gravity would take the speed away, at least a
+# fraction of half a swing.
+SHORTEST, LONGEST, LEAST = 0.5, 30.0, 0.05
+
+StatesAt = Callable[[np.ndarray], Instants]
+
+
+def brakes(
+    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], z0: float, gravity: float
+) -> list[Candidate]:
+    """Stops along the path of motions, from their states at any time and the times at which they rest."""
+    half, speeds = np.pi * np.sqrt(z0 / gravity), np.linalg.norm(instants.velocity, axis=1)
+    plans = list(_durations(instants.times, speeds / gravity, resting, half))
+    if not plans:
+        return []
+    u = np.linspace(0.0, 1.0, KNOTS)
+    further = u - 2.5 * u**4 + 3.0 * u**5 - u**6
+    rate, slowing = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2), -30.0 * u**2 * (1.0 - u) ** 2
+    started = np.array([[instants.times[k], duration] for k, duration in plans])
+    states = states_at((started[:, :1] + started[:, 1:] * further).ravel())
+    candidates = []
+    for i, (k, duration) in enumerate(plans):
+        part = states.take(np.arange(i * KNOTS, (i + 1) * KNOTS))
+        candidates.append(_along(k, part, u * duration, rate, slowing / duration, z0))
+    return candidates
+
+
+def rests_ahead(
+    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], z0: float, gravity: float
+) -> list[Candidate]:
+    """The motions themselves, up to the next time at which they rest."""
+    half, candidates = np.pi * np.sqrt(z0 / gravity), []
+    for k, time in enumerate(instants.times.tolist()):
+        later = resting[resting > time]
+        if not len(later):
+            continue
+        count = max(KNOTS, int(np.ceil((later[0] - time) / (SPACING * half))) + 1)
+        times = np.linspace(time, later[0], count)
+        ones = np.ones(count)
+        candidates.append(_along(k, states_at(times), times - time, ones, 0.0 * ones, z0))
+    return candidates
+
+
+def _durations(times: np.ndarray, braking: np.ndarray, resting: np.ndarray, half: float) -> Iterator[tuple[int, float]]:
+    for k, (time, unit) in enumerate(zip(times.tolist(), braking.tolist(), strict=True)):
+        later = resting[resting > time]
+        end = later[0] if len(later) else times.max()
+        low = max(SHORTEST * unit, LEAST * half)
+        high = min(max(LONGEST * unit, half), 2.0 * (end - time))
+        yield from ((k, duration) for duration in np.geomspace(low, high, TRIED).tolist() if high > low)
+
+
+def _along(k: int, part: Instants, times: np.ndarray, rate: np.ndarray, slowing: np.ndarray, z0: float) -> Candidate:
+    # A motion along a path, at its knots: s' and s'' of its parameter.
+    first, second = rate[:, None], slowing[:, None]
+    velocity, acceleration = part.velocity * first, part.acceleration * first**2 + part.velocity * second
+    return Candidate(
+        k, "path", hermite_spline(times, [part.position, velocity, acceleration], _turning(part, first, second), z0)
+    )
+
+
+def _turning(part: Instants, first: np.ndarray, second: np.ndarray) -> list[np.ndarray] | None:
+    # Unit quaternions with two derivatives: q' = omega q / 2, q'' = alpha q / 2 - |omega|^2 q / 4.
+    if part.quaternion is None or part.angular_velocity is None or part.angular_acceleration is None:
+        return None
+    omega = part.angular_velocity * first
+    alpha = part.angular_acceleration * first**2 + part.angular_velocity * second
+    turns = part.quaternion * _signs(part.quaternion)
+    square = np.sum(omega**2, axis=1, keepdims=True)
+    return [turns, half_product(omega, turns), half_product(alpha, turns) - 0.25 * square * turns]
+
+
+def _signs(quaternions: np.ndarray) -> np.ndarray:
+    # Signs with which quaternions are continuous.
+    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0)
+    return np.cumprod(np.append(1.0, flips))[:, None]
+
+
+def half_product(vectors: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
+    """Halves of the products of pure quaternions and quaternions."""
+    scalar = -np.sum(vectors * quaternions[:, 1:], axis=1, keepdims=True)
+    return 0.5 * np.concatenate([scalar, vectors * quaternions[:, :1] + np.cross(vectors, quaternions[:, 1:])], axis=1)
