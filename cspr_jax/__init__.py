@@ -29,6 +29,7 @@ _MODULES = {
     "bezier": "api.families.beziers",
     "bezier_durations": "api.families.beziers",
     "bezier_verdicts": "api.families.beziers",
+    "calibrate": "api.calibration",
     "check": "api.checks",
     "check_many": "api.many_checks",
     "compute_sweep": "api.sweeps",

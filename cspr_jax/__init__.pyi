@@ -1,5 +1,6 @@
 """The public names for type checkers and editors, as `__init__.py` loads them."""
 
+from cspr_jax.api.calibration import calibrate as calibrate
 from cspr_jax.api.checks import check as check
 from cspr_jax.api.elasticity import natural_frequencies as natural_frequencies
 from cspr_jax.api.elasticity import stiffness as stiffness

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cspr_jax import __version__
-from cspr_jax.cli import checks, listings, pictures, plans, published, simulations, stops, sweeps
+from cspr_jax.cli import calibration, checks, listings, pictures, plans, published, simulations, stops, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
 from cspr_jax.outputs.plots.style.options import with_widths
@@ -180,6 +180,7 @@ COMMANDS = (
         *simulations.COMMANDS,
         *checks.COMMANDS,
         *stops.COMMANDS,
+        *calibration.COMMANDS,
         *pictures.COMMANDS,
         *published.COMMANDS,
         *listings.COMMANDS,

@@ -243,3 +243,33 @@ TensionsOfPoses = Annotated[
 ]
 Wrenches = Annotated[ArrayLike, Numbers("finite numbers of shape (k, dof)", ((ANY, ANY),))]
 WrenchExtents = Annotated[ArrayLike, Numbers("finite numbers, one a degree of freedom", ((ANY,),))]
+
+# Measurements for calibration; NaN where nothing was measured.
+_READINGS = "finite numbers of shape (k, n_cables), m or rad, NaN where none was measured"
+_MEASURED: dict[str, Any] = {"nan": True, **LENGTHS}
+
+
+def _readings_or_file(key: str, value: Any) -> None:
+    if not isinstance(value, str | os.PathLike):
+        Numbers(f"{_READINGS}, or the path of a table", ((ANY, ANY),), nan=True, minimum=-1e9, maximum=1e9)(key, value)
+    else:
+        PATH(key, value)
+
+
+def _distances_or_file(key: str, value: Any) -> None:
+    if isinstance(value, str | os.PathLike):
+        PATH(key, value)
+    elif value is not None:
+        Numbers("rows of two cables, a distance and a deviation, m, or the path of a table", ((ANY, 4),))(key, value)
+
+
+ReadingsOrFile = Annotated[Any, _readings_or_file]
+MeasuredPositions = Annotated[
+    ArrayLike, Numbers("None, or numbers of shape (k, 3), at most 1e6 m", ((ANY, 3),), **_MEASURED)
+]
+MeasuredQuaternions = Annotated[ArrayLike, Numbers("None, or unit quaternions of shape (k, 4)", ((ANY, 4),), nan=True)]
+CalibrationDeviations = Annotated[
+    ArrayLike, Numbers("one to three numbers > 0, m, m and rad", ((), (ANY,)), positive=True)
+]
+DistanceRows = Annotated[Any, _distances_or_file]
+NextCount = Annotated[int, Integer(0, 1000)]

@@ -11,4 +11,5 @@ Files, each importing only from those above it:
     forward_kinematics   from lengths to poses
     motion_frequencies   natural frequencies along motions on elastic cables
     stops                proved ways to rest from states of a motion, also when cables break
+    calibration          spools, attachment points, offsets and radii from measurements
 """

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.api import plans, workspaces
+from cspr_jax.api import calibration, plans, workspaces
 from cspr_jax.api.arguments.checks import rule_of, rules_of
 from cspr_jax.api.files import imports, replays
 from cspr_jax.errors import CsprError, InputError
@@ -26,6 +26,7 @@ PUBLIC = {name: getattr(cspr_jax, name) for name in cspr_jax.__all__}
 METHODS = {
     "AvailableAccelerations.margin": workspaces.AvailableAccelerations.margin,
     "AvailableAccelerations.verdict": workspaces.AvailableAccelerations.verdict,
+    "Calibration.save": calibration.Calibration.save,
     "ImportedRobot.save": imports.ImportedRobot.save,
     "Plan.animate": plans.Plan.animate,
     "Plan.rows": plans.Plan.rows,
@@ -95,6 +96,8 @@ def is_good(function: str, key: str, kind: str) -> bool:
         return parameter.default is None or (function, key) in NONE
     if kind == "string" and function in ("check", "check_many", "least_time_paths"):
         return key == "robot" or (function, key) == ("check", "times")
+    if kind == "string" and function == "calibrate":
+        return key in ("robot", "lengths", "distances", "free")
     if kind == "string" and function in ("plot", "report") and key in ("robot", "z_axis"):
         return key == "robot"
     return kind == "string" and key in TEXTS | PATHS

@@ -16,7 +16,7 @@ from support.folder import PLAN, SWEEP, folder
 
 import cspr_jax
 from cspr_jax import cli
-from cspr_jax.api import plans
+from cspr_jax.api import calibration, plans
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -32,6 +32,7 @@ FUNCTIONS = {
     "volume": ("workspace_volume",),
     "plan": ("plan",),
     "check": ("check",),
+    "calibrate": ("calibrate",),
     "replay": ("replay",),
     "simulate": ("simulate",),
     "stops": ("stops",),
@@ -47,7 +48,7 @@ FUNCTIONS = {
 }
 # Options that say how to print, or what the process is set to, and what another function does.
 PRINTING = {"help", "json", "device", "all_errors", "list", "all", "readings"}
-NAMES = {"sweep": "given", "plan": "given", "result": "results"}
+NAMES = {"sweep": "given", "plan": "given", "result": "results", "measurements": "lengths"}
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
@@ -68,6 +69,7 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.Simulation.plot] if name == "simulate" else []
         functions += [cspr_jax.Stops.plot] if name == "stops" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
+        functions += [calibration.Calibration.save] if name == "calibrate" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
@@ -84,6 +86,7 @@ def test_every_command_has_its_function():
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"plan": "plan"} if name in ("plot", "report") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
+        own |= {"output": "path"} if name == "calibrate" else {}
         known |= {"slower"} if name == "check" else set()  # a method of what is checked
         known |= {"retime"} if name in ("plan", "check") else set()  # a function of what is planned or checked
         options = {action.dest for action in parser._actions} - PRINTING
