@@ -73,6 +73,7 @@ _MODULES = {
     "sampled_margin": "api.families.motions",
     "sensitivity": "api.workspaces",
     "simulate": "api.files.simulations",
+    "size": "api.sizing",
     "slacks": "api.families.motions",
     "spline": "api.families.motions",
     "status": "api.sweeps",

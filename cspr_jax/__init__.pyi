@@ -57,6 +57,7 @@ from cspr_jax.api.robots import point_mass as point_mass
 from cspr_jax.api.robots import point_mass_robot as point_mass_robot
 from cspr_jax.api.robots import three_cable_equivalent as three_cable_equivalent
 from cspr_jax.api.robots import with_cables as with_cables
+from cspr_jax.api.sizing import size as size
 from cspr_jax.api.stops import Stops as Stops
 from cspr_jax.api.stops import stops as stops
 from cspr_jax.api.sweeps import compute_sweep as compute_sweep

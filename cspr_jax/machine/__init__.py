@@ -8,6 +8,7 @@ Files, each importing only from those above it:
 
     drum_motions         what drums pay out along a motion, with derivatives, and their motors
     setpoints            the same at the ticks of a clock, along consecutive motions
+    sizing               the largest torques, speeds and powers along motions, root mean squares and energies
     forward_kinematics   from lengths to poses
     motion_frequencies   natural frequencies along motions on elastic cables
     stops                proved ways to rest from states of a motion, also when cables break

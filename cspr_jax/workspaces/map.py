@@ -18,6 +18,7 @@ from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.orientation_grids import cone_grid, equal_volume_grid, planar_grid
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -25,6 +26,7 @@ from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
 from cspr_jax.workspaces.cells.speeds import CableSpeeds, cable_speeds
+from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.static_cells import RestCells
@@ -174,17 +176,12 @@ class WorkspaceMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        positions = self._targets(cells)
         if self._samples is not None:
+            positions = self._targets(cells)
             kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
             set_answers = over_orientations(self._poses, positions, self._samples, self._volume, kind)
             return set_answers | dict.fromkeys(("cell_side", "cell_open"), np.zeros(len(positions), np.int16))
-        quaternions = np.repeat(self._quaternion, len(positions), axis=0)
-        if any(name in cells for name in TILT_TORSION):
-            angles = np.stack([cells.get(name, np.zeros(len(positions))) for name in TILT_TORSION], axis=1)
-            if self._row.is_planar:
-                angles[:, 0] = 0.5 * math.pi
-            quaternions = products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), quaternions)
+        positions, quaternions = self._poses_of(cells)
         answers = self._poses(positions, quaternions)
         sides, reasons = np.zeros((2, len(positions)), np.int16)
         if self._cells is not None:
@@ -193,6 +190,25 @@ class WorkspaceMap(GridMap):
                 sides, reasons = self._cells(positions, self._half_sizes(cells))
         fraction = (answers["verdict"] == 0).astype(float)
         return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
+
+    def _poses_of(self, cells: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        # Positions and quaternions of the cells of a map of poses.
+        positions = self._targets(cells)
+        quaternions = np.repeat(self._quaternion, len(positions), axis=0)
+        if any(name in cells for name in TILT_TORSION):
+            angles = np.stack([cells.get(name, np.zeros(len(positions))) for name in TILT_TORSION], axis=1)
+            if self._row.is_planar:
+                angles[:, 0] = 0.5 * math.pi
+            quaternions = products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), quaternions)
+        return positions, quaternions
+
+    def at_rest(self, cells: dict[str, np.ndarray]) -> tuple[AnyRobot, Limits, np.ndarray, np.ndarray]:
+        """Robot, limits, positions of the mass centre and quaternions of the cells of a map of poses."""
+        if self._samples is not None:
+            raise ConfigError(self._file, "workspace.orientations must be absent: each cell must be one pose")
+        positions, quaternions = self._poses_of(cells)
+        origins = self._poses.origins(positions, quaternions)
+        return self._robot, self._limits, mass_centres(self._robot, origins, quaternions), quaternions
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # Half of the extents (n, 3) of the cells: half of the distance to the farther neighbour along each axis.

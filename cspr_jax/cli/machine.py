@@ -1,0 +1,76 @@
+"""Commands at the machine: size, the smallest motors."""
+
+import argparse
+from pathlib import Path
+
+from cspr_jax.cli.command import (
+    Command,
+    add_all_errors,
+    add_device,
+    add_json,
+    add_output,
+    prepare_jax,
+    print_json,
+    print_table,
+)
+from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.outputs.plots.style.options import add_style
+from cspr_jax.runtime.progress import waiting
+from cspr_jax.store.files.publishing import check_writable
+
+
+def _add_size(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "sources",
+        nargs="+",
+        type=Path,
+        metavar="SOURCE",
+        help="plans (TOML); finished maps of workspaces, whose poses are held at rest; with --robot motions (CSV)",
+    )
+    parser.add_argument("--robot", help="motions of files: a catalogue name, or the path of a robot file")
+    parser.add_argument(
+        "--factor",
+        type=float,
+        default=1.5,
+        metavar="X",
+        help="safety factor on torque, speed, power and rms torque (default 1.5)",
+    )
+    add_json(parser)
+    add_output(parser, "draw torque over speed of each motor: .png, .pdf, .svg", metavar="FILE")
+    add_style(parser)
+    add_all_errors(parser)
+    add_device(parser)
+
+
+def _size(options: argparse.Namespace) -> int:
+    if options.output is not None and not options.output.suffix:
+        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
+    if not 0.0 < options.factor < float("inf"):
+        raise ConfigError("--factor", f"{options.factor:g}: must be a number > 0")
+    check_writable(options.output)
+    from cspr_jax.outputs.plots.style.style import style_of
+
+    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
+    style_of(**style)  # refuse bad options before slow work
+    with waiting():
+        prepare_jax(options, quick=True)
+        from cspr_jax.api.checks import check_file
+        from cspr_jax.api.sizing import size
+
+        def source(path: Path):
+            is_motion = options.robot is not None and path.suffix != ".toml"
+            return check_file(path, {"robot": options.robot}) if is_motion else path
+
+        sizes = size([source(path) for path in options.sources], factor=options.factor)
+        if options.output is not None:
+            sizes.plot(output=options.output, **style)
+    if options.json:
+        print_json(sizes.to_dict())
+    else:
+        print_table(sizes.to_table())
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),
+)
