@@ -71,6 +71,4 @@ def _size(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
-COMMANDS = (
-    Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),
-)
+COMMANDS = (Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),)

@@ -35,6 +35,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 512  # number of times computed at once
 TOLERANCE = 1e-8  # relative, of integrals over time
+RESTS = 1e-12  # rad/s, below which integrals take a motor for resting
 CURVE = 400  # number of times along a motion in a picture
 
 
@@ -66,24 +67,27 @@ class MotorDemands:
 @persistent_jit(static_argnames=("rule",))
 def winding_states(
     robot: AnyRobot, limits: Limits, motion: Motion, tau: Float[Array, "k"], *, rule: str
-) -> tuple[Float[Array, "k n"], Float[Array, "k n"]]:
-    """Winding speeds, rad/s, and winding torques, N m: at standstill the one of larger magnitude."""
+) -> tuple[Float[Array, "k n"], Float[Array, "k n"], Float[Array, "k n"]]:
+    """Winding speeds, winding torques, at standstill the one of larger magnitude, and those that integrals take."""
     drums, _ = drums_and_motors(robot, limits, motion, tau, rule=rule)
     return jax.vmap(partial(_worse, robot.winches))(*drums)
 
 
-def _worse(winches: Any, length: Array, rate: Array, acceleration: Array, tension: Array) -> tuple[Array, Array]:
-    # Winding speeds and torques; friction of a motor at standstill acts in the worse direction.
+def _worse(winches: Any, length: Array, rate: Array, acceleration: Array, tension: Array) -> tuple[Array, Array, Array]:
+    # At standstill friction acts in the worse direction; a motor that comes to rest stands still only at its end.
     radius = radii(winches, length)
     speed, change = (-winches.gear_ratio * each / radius for each in (rate, acceleration))
     winding, paying = (torques(winches, radius, speed, change, tension, jnp.full_like(speed, s)) for s in (1.0, -1.0))
-    still = jnp.where(jnp.abs(winding) >= jnp.abs(paying), winding, paying)
-    torque = jnp.where(jnp.abs(speed) <= STANDSTILL, still, jnp.where(speed > 0.0, winding, paying))
-    return speed, torque
+    still, moving = (
+        jnp.where(jnp.abs(winding) >= jnp.abs(paying), winding, paying),
+        jnp.where(speed > 0, winding, paying),
+    )
+    torque, integrand = (jnp.where(jnp.abs(speed) <= slowest, still, moving) for slowest in (STANDSTILL, RESTS))
+    return speed, torque, integrand
 
 
 @partial(jax.jit, static_argnames=("rule",))
-def _holding(robot: AnyRobot, limits: Limits, positions: Array, quaternions: Array, *, rule: str) -> Array:
+def _holding(robot: AnyRobot, limits: Limits, poses: tuple[Array, Array], *, rule: str) -> Array:
     def one(position, quaternion):
         still = jnp.zeros(3)
         state = State(position, still, still, matrix(quaternion), still, still, quaternion)
@@ -92,7 +96,7 @@ def _holding(robot: AnyRobot, limits: Limits, positions: Array, quaternions: Arr
         drum = unstretched_lengths(length, tension, robot.axial_stiffness)
         return _worse(robot.winches, drum, zero, zero, tension)[1]
 
-    return jax.vmap(one)(positions, quaternions)
+    return jax.vmap(one)(*poses)
 
 
 def holding_demands(
@@ -126,7 +130,8 @@ def motor_demands(
         edges = np.concatenate([[0.0], np.asarray(motion.breaks(), float), [1.0]])
 
         def integrands(tau, states=states):
-            return _integrands(*states(tau))
+            speed, _, torque = states(tau)
+            return _integrands(speed, torque)
 
         sums.append(length * integrals(integrands, edges, TOLERANCE))
         duration += length
@@ -139,7 +144,7 @@ def motor_demands(
 def _largest(states, tau: np.ndarray) -> np.ndarray:
     # Largest torques, speeds, powers and braking powers of all motors, (4 n,).
     def at(times: np.ndarray) -> np.ndarray:
-        speed, torque = (each.reshape(*times.shape, -1) for each in states(times.ravel()))
+        speed, torque = (each.reshape(*times.shape, -1) for each in states(times.ravel())[:2])
         power = torque * speed
         return -np.concatenate([np.abs(torque), np.abs(speed), power.clip(min=0.0), (-power).clip(min=0.0)], axis=-1)
 
@@ -164,7 +169,7 @@ def winding_curves(
         )
         for motion in motions
     ]
-    speeds, torque = zip(*parts, strict=True)
+    speeds, torque, _ = zip(*parts, strict=True)
     return np.concatenate(speeds), np.concatenate(torque)
 
 

@@ -17,6 +17,7 @@ from support.folder import PLAN, SWEEP, folder
 import cspr_jax
 from cspr_jax import cli
 from cspr_jax.api import calibration, plans
+from cspr_jax.api import plans, sizing
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -36,6 +37,7 @@ FUNCTIONS = {
     "replay": ("replay",),
     "simulate": ("simulate",),
     "stops": ("stops",),
+    "size": ("size", "check"),
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
@@ -68,6 +70,7 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
         functions += [cspr_jax.Simulation.plot] if name == "simulate" else []
         functions += [cspr_jax.Stops.plot] if name == "stops" else []
+        functions += [sizing.Sizes.plot] if name == "size" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         functions += [calibration.Calibration.save] if name == "calibrate" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
@@ -82,6 +85,7 @@ def test_every_command_has_its_function():
         }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"names": "names"} if name == "robots" else {}
+        own |= {"sources": "given"} if name == "size" else {}
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"plan": "plan"} if name in ("plot", "report") else {}
