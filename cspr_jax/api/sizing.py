@@ -21,8 +21,8 @@ from cspr_jax.errors.arguments import Kind, PictureSize, Positive
 from cspr_jax.machine.sizing import MotorDemands, holding_demands, joint_cycle, motor_demands, winding_curves
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.machine.sizing_report import WITH_FACTOR, size_object, size_table, worst
 from cspr_jax.outputs.plots.selection import result_at
-from cspr_jax.outputs.sizing_report import WITH_FACTOR, size_object, size_table, worst
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
