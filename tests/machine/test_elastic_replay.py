@@ -182,3 +182,31 @@ def test_wrong_damping(folder):
     (folder / "mine.toml").write_text(ROBOT + "axial_damping = 1.0\n")
     with pytest.raises(ConfigError, match=r"axial_damping = 1\.0: must be absent without axial_stiffness"):
         cspr_jax.plan("plan.toml")
+
+
+@pytest.mark.thorough
+def test_a_platform_that_only_translates_is_refused(folder):
+    pairs = cspr_jax.parallel_pair_robot(0.5, 0.05, mass=1.0)
+    robot = {"name": "pairs", "mass": 1.0, "translation_only": True, "axial_stiffness": 2e3}
+    robot |= {name: np.asarray(getattr(pairs, name)).tolist() for name in ("base_points", "platform_points", "inertia")}
+    poses = [{"rest": True}, {"position": [0.1, 0.0, 1.4]}, {"rest": True}]
+    plan = cspr_jax.plan({"schema": 1, "robot": robot, "z0": 1.4, "pose": poses})
+    with pytest.raises(ConfigError, match="--elastic: must be absent for a platform that only translates"):
+        cspr_jax.replay_elastic(plan)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["pulleys", "cogiro"])
+def test_pulleys_and_eight_cables(folder, kind):
+    """To 1e-7 m and rad along the plan, whichever rule chose the tensions."""
+    if kind == "pulleys":
+        plan = _plan(folder, "pulley_radius = 0.04\n")
+    else:
+        catalogue = Path(cspr_jax.__file__).parent / "catalogue" / "cogiro.toml"
+        (folder / "elastic.toml").write_text(catalogue.read_text() + "axial_stiffness = 2e6\n")
+        example = (Path(__file__).parents[2] / "sweeps" / "cogiro.toml").read_text()
+        (folder / "plan.toml").write_text(example.replace('"cogiro"', '"elastic.toml"'))
+        plan = cspr_jax.plan("plan.toml")
+    found = cspr_jax.replay_elastic(plan, step=0.002)
+    assert found.deviation(found.compensated).max() < 1e-7 and found.compensated.rotated.max() < 1e-7
+    assert found.settled > 1e-3

@@ -108,8 +108,8 @@ def replay_elastic(given: PlanOrFile, *, step: float = STEP, anyway: bool = Fals
 
     Raises:
         ConfigError: MuJoCo is not installed; the plan has a mistake, is not feasible or has no finite motion; its robot
-            has no `axial_stiffness`, or is a platform that only translates; without compensation a cable is slack at
-            the start; or the step is not positive or gives too many rows.
+            has no `axial_stiffness`, or is a platform that only translates; or the step is not positive or gives too
+            many rows.
     """
     need_mujoco()
     planned = given if isinstance(given, Plan) else plan(given)

@@ -3,7 +3,7 @@
 Drums set unstretched lengths l0 over time, whatever the effector does; each cable pulls with EA (l / l0 - 1), and with
 the damping times the rate of that strain, but never pushes. With compensation l0 = l / (1 + f / EA), from planned
 lengths l and tensions f: the planned motion then solves the equations of motion. Without, l0 = l: the effector hangs
-lower from the start.
+lower from the start, where it would hang if cables could push, or else in the planned place.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from jax import Array
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.errors import ConfigError
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.mujoco.mjcf import check_elastic, leads, model_xml, unstretched_of
@@ -110,15 +109,13 @@ def replay_elastic(plan: PlannedMotions, step: float = STEP) -> ElasticPlan:
     start, end = (_hanging(plan, *ends) for ends in ((plan.legs[0].motions[0], 0.0), (plan.legs[-1].motions[-1], 1.0)))
     moved = played(plan, min(step, FASTEST / _highest(plan)))
     rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
-    if start.missed > BALANCED or not np.asarray(start.tensions > 0.0).all():
-        raise ConfigError(
-            "plan", "cannot be played on elastic cables: without compensation a cable is slack at its start"
-        )
-    qpos = coordinates(body, moved)[0][0], coordinates(body, _started(plan, moved, start))[0][1]
+    planned = coordinates(body, moved)[0][0]
+    is_hanging = float(start.missed) <= BALANCED
+    qpos = planned, coordinates(body, _started(plan, moved, start))[0][1] if is_hanging else planned
     lengths = unstretched_of(body, moved), np.asarray(moved.length)
     paths = [_path(body, moved, *each) for each in zip(qpos, lengths, strict=True)]
     compensated, uncompensated = (path._replace(position=world.rotated(path.position)) for path in paths)
-    last, planned = plan.frame.outward(np.asarray(end.state.position)), world.rotated(moved.position[-1])
+    last, aim = plan.frame.outward(np.asarray(end.state.position)), world.rotated(moved.position[-1])
     is_settled = end.missed <= BALANCED and np.asarray(end.tensions > 0.0).all()
     return ElasticPlan(
         robot=plan.robot_file.name,
@@ -129,7 +126,7 @@ def replay_elastic(plan: PlannedMotions, step: float = STEP) -> ElasticPlan:
         position=world.rotated(moved.position[rows]),
         compensated=compensated,
         uncompensated=uncompensated,
-        settled=float(np.linalg.norm(last - planned)) if is_settled else float("nan"),
+        settled=float(np.linalg.norm(last - aim)) if is_settled else float("nan"),
     )
 
 
