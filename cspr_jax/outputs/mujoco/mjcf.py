@@ -53,6 +53,7 @@ BROWN = (0.36, 0.24, 0.18, 0.6)
 GLASS = (0.85, 0.45, 0.1, 0.35)
 HULL = "platform_hull"
 SPRINGS = "the control file has unstretched lengths, m, for tendon_lengthspring, and EA / length is tendon_stiffness"
+LED = " (on pulleys springlength also has what lies before them, half a radius)"
 
 
 def model_xml(
@@ -62,7 +63,7 @@ def model_xml(
     root = ElementTree.Element("mujoco", model=printable(body.name))
     rotated = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
     words = f"World axes are those of the robot file{rotated}; z is up. A control is the tension of a cable, N"
-    words += f", beside that of its spring: {SPRINGS}." if elastic else "."
+    words += f", beside that of its spring: {SPRINGS}{LED * bool(len(body.wheels))}." if elastic else "."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     # Make the Jacobian of the tendons dense, with a row for each cable. Constraints make pulleys follow their cables.
