@@ -24,6 +24,7 @@ from cspr_jax.errors.arguments import (
     MeasuredQuaternions,
     Names,
     NextCount,
+    Positive,
     ReadingsOrFile,
 )
 from cspr_jax.errors.suggestions import with_suggestions
@@ -163,6 +164,7 @@ def calibrate(  # noqa: PLR0913
     angles: bool = False,
     free: Names = (),
     sigma: CalibrationDeviations | None = None,
+    prior: Positive | None = None,
     loss: Literal["squares", "huber", "cauchy"] = "cauchy",
     point: Literal["mass-centre", "origin"] = "origin",
     distances: DistanceRows | None = None,
@@ -183,6 +185,8 @@ def calibrate(  # noqa: PLR0913
         sigma: standard deviations of lengths, m, of coordinates of positions, m, and of turns, rad, one to three of
             them; that of angles is times the drum radius over the gear ratio. None: 1e-4, 1e-4 and 1e-3 but for one
             common factor, which is estimated.
+        prior: standard deviation of the nominal numbers, m, which keeps the robot near them where measurements tell
+            little; needs `sigma`. None: nothing is known of them.
         loss: robust loss with which mistakes are sought, which are then left out; "squares" seeks none.
         point: point of a platform that the tracker follows.
         distances: (m, 4) measured distances between spools: two cables, counted from 1, distance and standard
@@ -208,7 +212,7 @@ def calibrate(  # noqa: PLR0913
         names = [free] if isinstance(free, str) else list(free)
         groups = names or [name for name in USUAL_GROUPS if name != "attachments" or isinstance(nominal, PlatformRobot)]
         deviations, ruled = arguments.deviations_of(sigma), arguments.distances_of(distances, nominal)
-        data = arguments.measurements_of(table, frame, deviations, ruled, own_axes="tracker" in groups)
+        data = arguments.measurements_of(table, frame, deviations, ruled, prior, own_axes="tracker" in groups)
         result = calibrated(inner, frame, data, groups, loss, arguments.target_of(inner, point))
         planned = result.next_poses(arguments.limits_at_rest(nominal, limits), next) if next else None
         return _of(result, nominal, arguments.robot_spec(file, nominal), table, lengths, planned)

@@ -38,6 +38,13 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         "factor, which is estimated)",
     )
     parser.add_argument(
+        "--prior",
+        type=float,
+        metavar="SD",
+        help="standard deviation of the nominal numbers, m: keeps the robot near them where measurements tell little "
+        "(beside --sigma)",
+    )
+    parser.add_argument(
         "--loss",
         choices=("squares", "huber", "cauchy"),
         default="cauchy",
@@ -93,6 +100,7 @@ def _calibrate(options: argparse.Namespace) -> int:
             options.measurements,
             free=[] if options.free is None else [word.strip() for word in options.free.split(",")],
             sigma=sigma,
+            prior=options.prior,
             loss=options.loss,
             point=options.point,
             distances=options.distances,

@@ -41,7 +41,7 @@ def file_points(robot: AnyRobot) -> np.ndarray:
 def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]]:
     """All parameters of the robot: nominal and calibrated values, standard deviations."""
     deviations = np.sqrt(np.diagonal(result.covariance))
-    unseen = np.abs(result.estimate.reduced.null_space).max(axis=0, initial=0.0) > 1e-5
+    unseen = np.abs(result.estimate.measured.null_space).max(axis=0, initial=0.0) > 1e-5
     rows = []
     for i, row in enumerate(result.parameters.rows):
         if row.group == "tracker":
@@ -154,6 +154,7 @@ def calibration_object(
         "not_identifiable": [direction.to_dict(result.parameters) for direction in result.directions],
         "weakest": {"standard_deviation": deviation, "text": direction},
         "mistakes": mistake_rows(result, lines),
+        "prior": data.prior,
         "offsets": np.asarray(estimate.setup.offsets).tolist(),
         "tracker": _tracker(result),
         "uncertainty": {"spool_positions": float(radii.max()), "probability": PROBABILITY},

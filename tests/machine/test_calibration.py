@@ -223,6 +223,22 @@ def test_robots_of_every_pattern_are_found(pattern, n):
         np.testing.assert_allclose(found, points, atol=1e-8, rtol=0.0)
 
 
+def test_a_prior_weighs_what_is_known():
+    """From readings alone, errors of the robot drawn as the prior says are as large as the covariance says."""
+    squares, nominal, best = [], [], []
+    for seed in range(5):
+        robot, spools, points, offsets, _, _, readings = body_case(50 + seed, 30, 2e-4, error=1e-3)
+        result = cspr_jax.calibrate(built(robot), readings, loss="squares", sigma=2e-4, prior=1e-3)
+        moved = [np.asarray(result.robot.base_points) - spools, result.robot.platform_points - points]
+        errors = np.concatenate([moved[0].ravel(), moved[1].ravel(), result.offsets - offsets])
+        squares.append(errors @ np.linalg.solve(result.covariance, errors))
+        nominal.append(np.linalg.norm(robot.base - spools))
+        best.append(np.linalg.norm(moved[0]))
+    assert np.mean(squares) == pytest.approx(56.0, abs=5.0 * np.sqrt(2.0 * 56.0 / 5.0))
+    assert np.mean(best) < np.mean(nominal) and np.isfinite(result.spool_positions)
+    assert len(result.not_identifiable) == 12
+
+
 def test_directions_change_nothing():
     """Each, applied to the robot, leaves the cost where it was, once the poses have followed."""
     robot, _, _, _, _, _, readings = body_case(5, 24, 1e-4)
@@ -447,6 +463,7 @@ def test_next_poses_tell_more_than_others():
         ({"quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (60, 1))}, "quaternions: given: must be absent: a point mass"),
         ({"positions": None}, "measurements: 3 at most at a pose: must be more than 3 at some poses"),
         ({"distances": [[1, 4, 0.5, 1e-3]]}, "distances = [[1.0, 4.0, 0.5, 0.001]]: must be two cables from 1 to 3"),
+        ({"prior": 1e-3}, "sigma: missing: must be given beside prior"),
         ({"loss": "absolute"}, 'loss = "absolute": must be'),
         ({"next": -1}, "next = -1: must be an integer from 0"),
     ],

@@ -65,12 +65,21 @@ def _from_arrays(
 
 
 def measurements_of(
-    table: MeasurementTable, frame: Frame, deviations: Deviations, distances: SpoolDistances, *, own_axes: bool
+    table: MeasurementTable,
+    frame: Frame,
+    deviations: Deviations,
+    distances: SpoolDistances,
+    prior: float | None,
+    *,
+    own_axes: bool,
 ) -> Measurements:
     """Measurements in the kernels' axes; with `own_axes`, a tracker's origin is not that of the file."""
     positions = frame.rotated(table.positions) if own_axes else frame.inward(table.positions)
     quaternions = frame.rotated_quaternions(table.quaternions)
-    return Measurements(table.readings, positions, quaternions, table.are_angles, deviations, distances)
+    if prior is not None and not deviations.are_given:
+        raise InputError("sigma", None, "must be given beside prior, to weigh both", problem="missing")
+    deviation = np.inf if prior is None else float(prior)
+    return Measurements(table.readings, positions, quaternions, table.are_angles, deviations, distances, deviation)
 
 
 def deviations_of(sigma: Any) -> Deviations:

@@ -160,7 +160,7 @@ def calibrated(
         setup = aligned_tracker(setup, poses, measurements.positions)
     adjustment = Adjustment(guess, setup, poses)
     result = estimated(adjustment, loss)
-    directions = unseen_directions(parameters, result.setup, result.reduced.null_space)
+    directions = unseen_directions(parameters, result.setup, result.measured.null_space)
     return Calibrated(setup, guess, result, directions, frame, fixed)
 
 

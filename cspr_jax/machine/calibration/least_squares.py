@@ -67,6 +67,7 @@ class Estimate:
         poses: the poses of the measurements.
         total: (p,) change of the parameters from the nominal setup, m.
         reduced: the problem of the parameters at the estimate, without mistakes.
+        measured: the same without what is known of the nominal numbers.
         residuals: (k, m) residuals over their nominal standard deviations, of mistakes too.
         standardised: (k, m) residuals over their own standard deviations, NaN where a mistake would not show.
         redundancies: (k, m) share of an error that its residual shows.
@@ -82,6 +83,7 @@ class Estimate:
     poses: EffectorPoses
     total: np.ndarray
     reduced: Reduced
+    measured: Reduced
     residuals: np.ndarray
     standardised: np.ndarray
     redundancies: np.ndarray
@@ -116,7 +118,15 @@ class Adjustment:
             raise InputError("lengths", None, "poses that the nominal robot can take", problem="no poses fit them")
 
     def _at(self, setup: Setup, poses: EffectorPoses, total: np.ndarray) -> _Iterate:
-        return _Iterate(setup, poses, total, self.predictor(setup, poses), self._distances(setup))
+        distances, prior = self._distances(setup), self._prior(total)
+        extra = np.concatenate([distances[0], prior[0]]), np.concatenate([distances[1], prior[1]])
+        return _Iterate(setup, poses, total, self.predictor(setup, poses), extra)
+
+    def _prior(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # What is known of the nominal numbers, as measurements of them.
+        deviation, is_of_machine = self.predictor.measurements.prior, self.parameters.is_of_machine
+        is_known = is_of_machine & np.isfinite(deviation)
+        return np.eye(len(total))[is_known] / deviation, total[is_known] / deviation
 
     def _distances(self, setup: Setup) -> tuple[np.ndarray, np.ndarray]:
         # Residuals of distances between spools, whitened, and their derivatives.
@@ -131,15 +141,18 @@ class Adjustment:
     @staticmethod
     def cost(iterate: _Iterate, weights: Float[np.ndarray, "k m"]) -> float:
         """Sum of the squares of the residuals."""
+        if not (np.isfinite(iterate.linearised.by_parameters).all() and np.isfinite(iterate.linearised.by_pose).all()):
+            return np.inf  # a cable without length has no direction
         with np.errstate(invalid="ignore", over="ignore"):
             return float(np.sum(weights * iterate.linearised.residuals**2) + np.sum(iterate.extra[1] ** 2))
 
-    def reduced(self, weights: Float[np.ndarray, "k m"], damping: float = 0.0) -> Reduced:
+    def reduced(self, weights: Float[np.ndarray, "k m"], damping: float = 0.0, *, has_prior: bool = True) -> Reduced:
         """The problem of the parameters at the best iterate, for some weights."""
+        count = None if has_prior else len(self.predictor.measurements.distances.distance)
         root, problem = np.sqrt(weights), self.best.linearised
         each = root[:, :, None]
         weighted = Linearised(problem.residuals * root, problem.by_parameters * each, problem.by_pose * each)
-        return reduced(weighted, *self.best.extra, damping)
+        return reduced(weighted, self.best.extra[0][:count], self.best.extra[1][:count], damping)
 
     def solve(self, weights: Float[np.ndarray, "k m"], iterations: int = ITERATIONS) -> bool:
         """Move to the minimum for some weights; tell whether steps became as small as rounding allows."""
@@ -257,6 +270,7 @@ def _answer(adjustment: Adjustment, mistaken: Bool[np.ndarray, "k m"], is_conver
         poses=best.poses,
         total=best.total,
         reduced=problem,
+        measured=adjustment.reduced(weights, has_prior=False),
         residuals=best.linearised.residuals,
         standardised=values,
         redundancies=shown,

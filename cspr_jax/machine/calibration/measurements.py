@@ -62,6 +62,7 @@ class Measurements:
         are_angles: whether the readings are angles.
         deviations: standard deviations.
         distances: distances between spools.
+        prior: standard deviation of the nominal numbers of the robot, m; inf: nothing is known of them.
     """
 
     readings: np.ndarray
@@ -70,6 +71,7 @@ class Measurements:
     are_angles: bool = False
     deviations: Deviations = USUAL_DEVIATIONS
     distances: SpoolDistances = NO_DISTANCES
+    prior: float = np.inf
 
     @property
     def count(self) -> int:

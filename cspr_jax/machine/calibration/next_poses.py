@@ -26,8 +26,6 @@ from cspr_jax.workspaces.static_poses import RestPoses
 CANDIDATES = 1024
 # Largest turn about each axis from the orientation of the file, rad: half of the candidates have none.
 LARGEST_TURN = 0.35
-# Depth of the box of candidates without a floor, over the largest distance of a spool from the centroid.
-DEPTH = 1.5
 # Smallest and largest tensions where the robot has no such limits, over the weight.
 LOADS = (0.01, 10.0)
 
@@ -55,9 +53,9 @@ def candidates(
     check_cables(robot)
     row, base = PATTERNS[robot.pattern], np.asarray(robot.base_points)
     low, high = np.minimum(base.min(0), measured.min(0)), np.maximum(base.max(0), measured.max(0))
-    high[2] = max(high[2], DEPTH * float(spool_radius(robot)))
-    if limits.floor is not None:
-        high[2] = min(high[2], float(limits.floor))
+    # Without a floor, no lower than poses that were measured.
+    high[2] = float(measured[:, 2].max() if limits.floor is None else limits.floor)
+    low[2] = min(low[2], high[2])
     spread = qmc.Halton(6, seed=0).random(count)
     positions = np.tile(fixed, (count, 1))
     along = list(row.forces)
@@ -89,8 +87,10 @@ def next_poses(
 ) -> NextPoses:
     """Choose poses to measure next among candidates, one after the other; `is_measured` says what is measured there."""
     setup, are_angles = estimate.setup, predictor.measurements.are_angles
-    readings = np.asarray(readings_of(setup, choice, are_angles=are_angles)) if len(choice.positions) else np.zeros(0)
-    is_number = np.isfinite(readings).all(axis=-1) if len(readings) else np.zeros(0, bool)
+    readings = np.zeros((0, setup.robot.n_cables))
+    if len(choice.positions):
+        readings = np.asarray(readings_of(setup, choice, are_angles=are_angles))
+    is_number = np.isfinite(readings).all(axis=-1)
     choice, readings = EffectorPoses(*(x[is_number] for x in choice)), readings[is_number]
     if len(readings) < count:
         error = f"{len(readings)} of {CANDIDATES} poses at rest are within the limits"
@@ -111,4 +111,11 @@ def next_poses(
         gains[chosen] = -np.inf
         chosen.append(int(gains.argmax()))
         information = information + rows[chosen[-1]].T @ rows[chosen[-1]]
-    return NextPoses(EffectorPoses(*(x[chosen] for x in choice)), readings[chosen], np.linalg.inv(information))
+    added = np.sum([rows[i].T @ rows[i] for i in chosen], axis=0) + estimate.reduced.information
+    return NextPoses(EffectorPoses(*(x[chosen] for x in choice)), readings[chosen], _covariance(estimate, added))
+
+
+def _covariance(estimate: Estimate, information: np.ndarray) -> np.ndarray:
+    # Covariance along what has been seen; what has not is held.
+    seen = estimate.reduced.vectors[estimate.reduced.is_seen]
+    return seen.T @ np.linalg.inv(seen @ information @ seen.T) @ seen

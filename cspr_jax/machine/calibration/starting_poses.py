@@ -22,7 +22,12 @@ FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e9
 # Steps of a pose, over the robot's size, that end its search: the estimate goes on from there.
 SMALL_STEP = 1e-6
 # Mean errors of lengths below this fraction of the robot's size are those of a pose, not of a wrong minimum.
-CLOSE = 0.01
+CLOSE = 1e-3
+# Mean errors this many times as large as those of a good quarter of the poses are those of a wrong minimum; such poses
+# are sought again from several poses with similar readings.
+WRONG, NEIGHBOURS = 4.0, 6
+# Errors of lengths, over the robot's size, that are always small enough.
+RESOLUTION = 1e-6
 # Costs that differ by this fraction, and a little, count as equal: the first start is taken.
 ALIKE, NEGLIGIBLE = 1e-3, 1e-12
 # Positions whose second spread is below this fraction of the first lie on a line.
@@ -46,29 +51,44 @@ def starting_poses(
     used = predictor.is_used.copy()
     used[:, setup.robot.n_cables :] &= by_tracker
     radius, count = float(spool_radius(setup.robot)), data.count
-    best: EffectorPoses | None = None
-    lowest = np.full(count, np.inf)
+    best, lowest = EffectorPoses(np.tile(fixed, (count, 1)), np.tile(IDENTITY, (count, 1))), np.full(count, np.inf)
+
+    def improve(starts: EffectorPoses) -> np.ndarray:
+        # Better poses from other starts; the mean errors of lengths that are left, m.
+        nonlocal best, lowest
+        poses, costs = _nearest(predictor, setup, starts, used)
+        better = costs < lowest * (1.0 - ALIKE) - NEGLIGIBLE
+        best = EffectorPoses(*(np.where(better[:, None], *pair) for pair in zip(poses, best, strict=True)))
+        lowest = np.where(better, costs, lowest)
+        return np.sqrt(lowest / np.maximum(used.sum(1), 1)) * data.deviations.length
+
     for depth in DEPTHS:
-        positions = np.tile(fixed, (count, 1))
+        positions, quaternions = np.tile(fixed, (count, 1)), np.tile(IDENTITY, (count, 1))
         if 2 in row.forces:
             positions[:, 2] = depth * radius
-        quaternions = np.tile(IDENTITY, (count, 1))
         if by_tracker:
             seen = np.isfinite(data.positions) & np.isin(np.arange(3), row.forces)
             positions = np.where(seen, data.positions, positions)
             quaternions = np.where(np.isfinite(data.quaternions), data.quaternions, quaternions)
-        poses, costs = _nearest(predictor, setup, EffectorPoses(positions, quaternions), used)
-        better = costs < lowest * (1.0 - ALIKE) - NEGLIGIBLE
-        best = (
-            poses
-            if best is None
-            else EffectorPoses(*(np.where(better[:, None], *pair) for pair in zip(poses, best, strict=True)))
-        )
-        lowest = np.where(better, costs, lowest)
-        errors = np.sqrt(lowest / np.maximum(used.sum(1), 1)) * data.deviations.length
+        errors = improve(EffectorPoses(positions, quaternions))
         if (errors <= CLOSE * radius).all():
             break
-    return best or EffectorPoses(np.tile(fixed, (count, 1)), np.tile(IDENTITY, (count, 1)))
+    for turn in range(NEIGHBOURS):
+        typical = np.quantile(errors[np.isfinite(errors)], 0.25) if np.isfinite(errors).any() else 0.0
+        is_wrong = ~(errors <= WRONG * typical + RESOLUTION * radius)
+        if not is_wrong.any() or is_wrong.all():
+            break
+        errors = improve(_neighbours(best, np.nan_to_num(data.readings * setup.per_reading), is_wrong, turn))
+    return best
+
+
+def _neighbours(poses: EffectorPoses, readings: np.ndarray, is_wrong: np.ndarray, turn: int) -> EffectorPoses:
+    # In place of wrong poses, right ones whose readings are near.
+    right = np.flatnonzero(~is_wrong)
+    distances = np.linalg.norm(readings[is_wrong][:, None] - readings[right], axis=2)
+    chosen = np.arange(len(readings))
+    chosen[is_wrong] = right[np.argsort(distances, axis=1)[:, min(turn, len(right) - 1)]]
+    return EffectorPoses(*(part[chosen] for part in poses))
 
 
 def _nearest(
