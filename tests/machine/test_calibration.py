@@ -223,6 +223,7 @@ def test_robots_of_every_pattern_are_found(pattern, n):
         np.testing.assert_allclose(found, points, atol=1e-8, rtol=0.0)
 
 
+@pytest.mark.thorough
 def test_a_prior_weighs_what_is_known():
     """From readings alone, errors of the robot drawn as the prior says are as large as the covariance says."""
     squares, nominal, best = [], [], []
@@ -274,7 +275,7 @@ def test_derivatives_are_those_of_differences():
     """By every parameter and every coordinate of the poses, of angles behind pulleys with a tracker of its own."""
     from cspr_jax.machine.calibration.starting_poses import moved_poses
 
-    case = winch_case(4)
+    case = winch_case(4, 12)
     kinds = ["spools", "attachments", "offsets", "drums", "pulleys", "tracker", "target"]
     result = cspr_jax.calibrate(case.robot, case.angles, case.seen, case.turned, angles=True, free=kinds)._result
     setup, poses, predictor = result.estimate.setup, result.estimate.poses, result.predictor
