@@ -193,9 +193,9 @@ def calibration_lines(result: Calibrated, name: str, lines: Sequence[int], plann
         text.append(f"known worst, with a standard deviation of {_mm(deviation)}: {direction}")
     pairs = [pair for pair in correlations(result.parameters, result.covariance, MAX_PAIRS) if abs(pair[2]) > 0.9]
     text += [f"correlated {value:+.4f}: {first} and {second}" for first, second, value in pairs]
-    mistakes = mistake_rows(result, lines)
+    mistakes, noun = mistake_rows(result, lines), "line" if lines[0] else "row"  # of a file, of an array
     for row in mistakes[:MAX_MISTAKES]:
-        text.append(f"left out: row {row['row']}, {row['column']}, off by {row['sigmas']:.3g} standard deviations")
+        text.append(f"left out: {noun} {row['row']}, {row['column']}, off by {row['sigmas']:.3g} standard deviations")
     if len(mistakes) > MAX_MISTAKES:
         text.append(f"and {len(mistakes) - MAX_MISTAKES} more left out")
     text.append(uncertainty_text(result))

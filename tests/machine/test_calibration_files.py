@@ -64,7 +64,7 @@ def test_a_table_becomes_a_robot_file(folder):
     again = cspr("calibrate", "m.csv", "--robot", "robot.toml", "-o", "new.toml")
     assert again[:2] == (3, "") and "is there already" in again[2]
     code, out, err = cspr("calibrate", "m.csv", "--robot", "robot.toml", "-o", "new.toml", "--replace")
-    assert (code, err) == (0, "") and "left out: row 10, length_3" in out and "spool 3 z" in out
+    assert (code, err) == (0, "") and "left out: line 10, length_3" in out and "spool 3 z" in out
 
 
 def test_angles_set_the_zero_of_the_winches(folder):
