@@ -32,6 +32,7 @@ _MODULES = {
     "calibrate": "api.calibration",
     "check": "api.checks",
     "check_many": "api.many_checks",
+    "compare_log": "api.files.logs",
     "compute_sweep": "api.sweeps",
     "copy_examples": "api.files.listings",
     "ellipse": "api.families.ellipses",

@@ -47,6 +47,7 @@ from cspr_jax.api.files.reports import report as report
 from cspr_jax.api.files.simulations import Simulation as Simulation
 from cspr_jax.api.files.simulations import simulate as simulate
 from cspr_jax.api.forward_kinematics import forward as forward
+from cspr_jax.api.files.logs import compare_log as compare_log
 from cspr_jax.api.many_checks import check_many as check_many
 from cspr_jax.api.plans import plan as plan
 from cspr_jax.api.retiming import retime as retime

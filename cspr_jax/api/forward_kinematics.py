@@ -6,7 +6,6 @@ import dataclasses
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,13 +14,14 @@ from cspr_jax.api.arguments.kernel_arguments import check_in_plane, quaternions
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import ANY, PointOrPoints, Positive
 from cspr_jax.errors.given_numbers import Numbers
+from cspr_jax.machine.forward_kinematics.equilibrium import TAUT, equilibria
+from cspr_jax.machine.forward_kinematics.lengths import checked_lengths
 from cspr_jax.machine.forward_kinematics.solutions import Poses, Search
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.robots.model.patterns import PATTERNS, Pattern
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
-from cspr_jax.robots.model.winches import cable_lengths
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.poses.geometry import mass_centres
@@ -32,7 +32,6 @@ _QUATERNIONS = "unit quaternions of shape (4,) or (n, 4), scalar first"
 Orientations = Annotated[ArrayLike, Numbers(_QUATERNIONS, ((4,), (ANY, 4)))]
 _WEIGHTS = "numbers >= 0, one a cable, of which as many as degrees of freedom are above 0"
 Weights = Annotated[ArrayLike, Numbers(_WEIGHTS, ((ANY,),), minimum=0.0, maximum=1e9)]
-LARGEST_LENGTH = 1e6  # m
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +49,8 @@ class ForwardKinematics:
         all_positions: (n, k, 3) all solutions, NaN behind the last; None unless asked for. The first is the one above.
         all_quaternions: (n, k, 4); None likewise.
         is_complete: whether there are no other solutions than these.
+        slack: (n, n_cables) whether each cable is slack, at equilibrium; None unless that was asked for.
+        tensions: (n, n_cables) N, at equilibrium, 0 where a cable is slack; None likewise.
     """
 
     positions: np.ndarray
@@ -61,17 +62,19 @@ class ForwardKinematics:
     all_positions: np.ndarray | None
     all_quaternions: np.ndarray | None
     is_complete: bool
+    slack: np.ndarray | None
+    tensions: np.ndarray | None
     _robot: Any = dataclasses.field(repr=False)
     _inner: tuple[np.ndarray, np.ndarray] = dataclasses.field(repr=False)
 
     @property
     def residual(self) -> np.ndarray:
-        """Largest absolute residual of each pose.
+        """Largest absolute residual of each pose; slack cables do not count.
 
         Returns:
             (n,) m.
         """
-        return np.abs(self.residuals).max(1)
+        return np.abs(self.residuals if self.slack is None else np.where(self.slack, 0.0, self.residuals)).max(1)
 
     @property
     def worst_cable(self) -> np.ndarray:
@@ -103,7 +106,7 @@ class ForwardKinematics:
 
 
 @checked(instead="lengths: cable_lengths of a state")
-def forward(
+def forward(  # noqa: PLR0913
     robot: PointMassRobot | PlatformRobot,
     lengths: Lengths,
     *,
@@ -111,6 +114,7 @@ def forward(
     start_orientations: Orientations | None = None,
     angles: bool = False,
     all_solutions: bool = False,
+    equilibrium: bool = False,
     weights: Weights | None = None,
     tolerance: Positive | None = None,
     point: Literal["mass-centre", "origin"] | None = None,
@@ -148,7 +152,7 @@ def forward(
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
     row = PATTERNS[robot.pattern]
     with double_precision():
-        given = lengths_of(robot, lengths, is_angle=angles)
+        given = checked_lengths(robot, lengths, is_angle=angles)
         inner_robot, frame = centred(robot)
         if robot.n_cables < robot.dof:
             raise InputError("robot", robot.n_cables, f"{robot.dof} cables or more, as many as degrees of freedom")
@@ -158,30 +162,20 @@ def forward(
         search = Search(inner_robot, loads, tolerance, np.where(np.isin(range(3), row.forces), 0.0, fixed))
         if row.is_jointed and start_orientations is None:  # the joint alone is no start
             starts = None
-        if starts is not None and not (all_solutions or search.is_closed):
-            poses = search.near(given, starts[0], starts[1])
-        else:
-            poses = search.every(given) if all_solutions or search.is_closed else search.usual(given)
-            poses = search.nearest_first(poses, starts[0], starts[1]) if starts is not None else poses
+        if equilibrium:
+            rest = equilibria(search, given, starts)
+            found = _answers(inner_robot, frame, rest.poses, point or "origin", is_all=all_solutions)
+            is_slack = rest.poses.residuals[:, 0] < -TAUT * search.size
+            return dataclasses.replace(found, slack=is_slack, tensions=rest.tensions[:, 0])
+        poses = _poses(search, given, starts, is_all=all_solutions)
         return _answers(inner_robot, frame, poses, point or "origin", is_all=all_solutions)
 
 
-def lengths_of(robot: Any, given: ArrayLike, *, is_angle: bool) -> np.ndarray:
-    """Lengths of cables, (n, n_cables) m, from lengths or angles of motors, checked."""
-    values = np.atleast_2d(np.asarray(given, float))
-    name = "angles" if is_angle else "lengths"
-    if values.shape[1] != robot.n_cables:
-        allowed = f"finite numbers of shape ({robot.n_cables},) or (n, {robot.n_cables})"
-        raise InputError("lengths", f"shape {np.shape(given)}", allowed)
-    if is_angle:
-        if robot.winches is None:
-            raise InputError("angles", True, "False: the robot has no [winch], which gives lengths of angles")
-        values = np.asarray(jax.vmap(lambda row: cable_lengths(robot.winches, row))(values))
-    bad = np.flatnonzero(~((values > 0.0) & (values <= LARGEST_LENGTH)).all(1))
-    if len(bad):
-        allowed = "lengths > 0, at most 1e6 m" if not is_angle else "angles that give lengths > 0, at most 1e6 m"
-        raise InputError(f"{name}[{bad[0]}]", values[bad[0]].tolist(), allowed)
-    return values
+def _poses(search: Search, given: np.ndarray, starts: tuple[np.ndarray, np.ndarray] | None, *, is_all: bool) -> Poses:
+    is_every = is_all or search.is_closed
+    if starts is None:
+        return search.every(given) if is_every else search.usual(given)
+    return search.nearest_first(search.every(given), *starts) if is_every else search.near(given, *starts)
 
 
 def _weights(weights: Any, robot: Any) -> np.ndarray:
@@ -246,6 +240,8 @@ def _answers(robot: Any, frame: Frame, poses: Poses, point: str, *, is_all: bool
         np.where(shown, positions, np.nan) if is_all else None,
         np.where(shown, orientations, np.nan) if is_all else None,
         poses.is_complete,
+        None,
+        None,
         robot,
         (poses.positions[:, 0], poses.quaternions[:, 0]),
     )

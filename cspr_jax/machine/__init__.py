@@ -13,4 +13,5 @@ Files, each importing only from those above it:
     motion_frequencies   natural frequencies along motions on elastic cables
     stops                proved ways to rest from states of a motion, also when cables break
     calibration          spools, attachment points, offsets and radii from measurements
+    logs                 recorded logs beside plans: delay, cables that disagree or are slack
 """

@@ -16,7 +16,12 @@ from support.folder import PLAN, SWEEP, folder
 
 import cspr_jax
 from cspr_jax import cli
+<<<<<<< HEAD
 from cspr_jax.api import calibration, plans, sizing
+=======
+from cspr_jax.api import plans
+from cspr_jax.api.files.logs import LogComparison
+>>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -34,9 +39,14 @@ FUNCTIONS = {
     "check": ("check",),
     "calibrate": ("calibrate",),
     "replay": ("replay",),
+<<<<<<< HEAD
     "simulate": ("simulate",),
     "stops": ("stops",),
     "size": ("size", "check"),
+=======
+    "locate": ("forward",),
+    "log": ("compare_log",),
+>>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
@@ -71,7 +81,11 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.Stops.plot] if name == "stops" else []
         functions += [sizing.Sizes.plot] if name == "size" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
+<<<<<<< HEAD
         functions += [calibration.Calibration.save] if name == "calibrate" else []
+=======
+        functions += [LogComparison.page] if name == "log" else []
+>>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
@@ -90,8 +104,13 @@ def test_every_command_has_its_function():
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"plan": "plan"} if name in ("plot", "report") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
+<<<<<<< HEAD
         own |= {"output": "path"} if name == "calibrate" else {}
+=======
+        own |= {"file": "lengths", "all": "all_solutions", "slack": "equilibrium"} if name == "locate" else {}
+>>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
         known |= {"slower"} if name == "check" else set()  # a method of what is checked
+        known |= {"output"} if name == "locate" else set()  # a table of the answers
         known |= {"retime"} if name in ("plan", "check") else set()  # a function of what is planned or checked
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name

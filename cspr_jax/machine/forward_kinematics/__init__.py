@@ -7,8 +7,10 @@ slack, the pose is that of least potential energy.
 
 Files, each importing only from those above it:
 
+    lengths           lengths from lengths or angles of motors
     spheres           points at given distances from spools: one point mass, both sides
     planar_platforms  all poses of a platform in the plane on three cables
     least_squares     damped Gauss-Newton steps, many poses at once
     solutions         one solution, or all that are found, for each set of lengths
+    equilibrium       poses of equilibrium where cables may be slack
 """

@@ -128,7 +128,7 @@ def _fit(
 
     def step(now: _Lanes) -> _Lanes:
         move = _step(now, weights)
-        position, quaternion = _moved(robot, now.position, now.quaternion, move, radius)
+        position, quaternion = moved(robot, now.position, now.quaternion, move, radius)
         residual, columns, cost = evaluate(position, quaternion)
         is_lower = (cost < now.cost) & ~now.is_over
         length = jnp.sqrt(sum(x * x for x in move))
@@ -155,7 +155,7 @@ def _fit(
 
 
 def _evaluated(robot, lengths, weights, radius, position, quaternion) -> tuple[Array, tuple[Array, ...], Array]:
-    residual = _lengths(robot, tuple(position), tuple(quaternion)) - lengths
+    residual = lengths_in_lanes(robot, tuple(position), tuple(quaternion)) - lengths
     columns, _ = geometry.wrench_columns(robot, tuple(position), _turning(robot, quaternion), radius)
     return residual, tuple(columns), jnp.sum(weights[:, None] * residual**2, axis=0)
 
@@ -164,7 +164,8 @@ def _turning(robot: AnyRobot, quaternion: Array) -> Vector | None:
     return tuple(quaternion) if isinstance(robot, PlatformRobot) else None
 
 
-def _lengths(robot: AnyRobot, position: Vector, quaternion: Vector) -> Float[Array, "n_cables k"]:
+def lengths_in_lanes(robot: AnyRobot, position: Vector, quaternion: Vector) -> Float[Array, "n_cables k"]:
+    """Lengths of the cables, arcs on pulleys included, one lane a pose."""
     arms = geometry.turned_arms(robot, quaternion)
     shape = robot.n_cables, len(position[0])
     target = [jnp.broadcast_to(x[None], shape) for x in position]
@@ -216,10 +217,10 @@ def _solved(matrix: list[list[Array]], right: list[Array]) -> list[Array]:
     return found
 
 
-def _moved(
+def moved(
     robot: AnyRobot, position: Array, quaternion: Array, move: list[Array], radius: Array
 ) -> tuple[Float[Array, "3 k"], Float[Array, "4 k"]]:
-    # Pose after a small motion: a shift, and a rotation vector in fixed axes.
+    """Poses after small motions: a shift, and a rotation vector in fixed axes times the radius, one lane a pose."""
     row = PATTERNS[robot.pattern]
     zero = jnp.zeros_like(move[0])
     shift = [move[row.forces.index(i)] if i in row.forces else zero for i in range(3)]

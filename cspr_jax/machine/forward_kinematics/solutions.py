@@ -193,8 +193,12 @@ class Search:
         is_met = np.asarray(np.abs(residuals).max(-1) <= self._tolerance)
         return np.logical_and(has_ended, is_met)
 
+    def starts(self, lengths: Float[np.ndarray, "n m"]) -> tuple[np.ndarray, np.ndarray]:
+        """Starts of a search for several poses: positions (n, k, 3) and quaternions (n, k, 4), the level ones first."""
+        return self._starts(lengths, _orientations(self.row.is_planar, self.row.is_body))
+
     def _from_many(self, lengths: np.ndarray) -> Poses:
-        return self._fitted_all(lengths, *self._starts(lengths, _orientations(self.row.is_planar, self.row.is_body)))
+        return self._fitted_all(lengths, *self.starts(lengths))
 
     def _fitted_all(self, lengths: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Poses:
         count, starts = positions.shape[:2]

@@ -19,7 +19,7 @@ from cspr_jax.numerics.shapes import Num
 # Typed arrays of browsers, by NumPy's dtypes.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 # The page's own scripts, in the order in which a browser reads them.
-SCRIPTS = ("page.js", "map.js", "motion.js", "solid.js", "start.js")
+SCRIPTS = ("page.js", "map.js", "motion.js", "solid.js", "charts.js", "start.js")
 STYLE, FRAME = "page.css", "page.html"
 PLACEHOLDER = re.compile(r"<!-- (\w+) -->")
 

@@ -4,6 +4,7 @@ function setTheme(name) {
   if (map.values.length) drawMap();
   if (motion.own) drawMotion();
   drawSolid();
+  drawCharts();
 }
 
 async function start() {
@@ -29,6 +30,7 @@ async function start() {
   element("solid-side").hidden = !content.solid;
   if (content.map) await startMap();
   await startSolid();
+  await startCharts();
   if (content.motions.length) await showMotion(content.shown ?? 0);
   document.documentElement.dataset.ready = "yes";
 }

@@ -1,0 +1,225 @@
+"""Recorded logs of a machine beside the plan that it has played, from Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.api import plans
+from cspr_jax.api.arguments.checks import checked
+from cspr_jax.config.cable_logs import CableLog, read_cable_log
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import File, Positive
+from cspr_jax.machine.forward_kinematics.lengths import lengths_of
+from cspr_jax.machine.forward_kinematics.solutions import Search
+from cspr_jax.machine.logs.delay import delay_of
+from cspr_jax.machine.logs.disagreement import disagreement_of, intervals, longer_rows
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs import log_report
+from cspr_jax.outputs.log_report import ComparedLog
+from cspr_jax.outputs.plan_curves import PlanCurves, curves_of
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import check_writable, publish
+from cspr_jax.workspaces.poses import geometry
+
+# A cable counts as slack where its measured tension is below this fraction of the planned one.
+SLACK = 0.05
+# Residuals that make a cable longer than the others imply: so many robust deviations, and a fraction of the size.
+DEVIATIONS, SMALLEST = 6.0, 1e-4
+ROWS, BATCH = 4000, 1024  # rows of which disagreement is judged
+
+
+class LogComparison(ComparedLog):
+    """A log beside its plan; see `cspr_jax.outputs.log_report.ComparedLog` for its fields."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The comparison as plain values.
+
+        Returns:
+            what `cspr log --json` prints.
+        """
+        return log_report.log_object(self)
+
+    def lines(self) -> list[str]:
+        """The comparison as text.
+
+        Returns:
+            the lines that `cspr log` prints above its table.
+        """
+        return log_report.log_lines(self)
+
+    def to_table(self) -> Any:
+        """Errors of each cable.
+
+        Returns:
+            a table of rich.
+        """
+        return log_report.log_table(self)
+
+    @checked()
+    def page(self, output: str | Path) -> Path:
+        """Write a page with charts of errors, lengths and tensions: one file that needs no network.
+
+        Args:
+            output: page to write, .html; an existing file is replaced.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: the wrong ending, or plotly is not installed.
+            StoreError: the page cannot be written.
+        """
+        from cspr_jax.outputs.plots.pages.logs import log_content
+        from cspr_jax.outputs.plots.pages.page import page_of
+
+        path = Path(output)
+        if path.suffix != ".html":
+            raise ConfigError("-o", f"{path}: must end in .html")
+        check_writable(path)
+        content = log_content(self)
+        try:
+            publish(Disk(), path, page_of(content["title"], content).encode())
+        except InputError as error:
+            raise ConfigError(path, str(error)) from error
+        return path
+
+
+@checked()
+def compare_log(
+    log: str | Path, plan: File, *, tolerance: Positive | None = None, max_delay: Positive = 2.0
+) -> LogComparison:
+    """Compare a recorded log of a machine with the plan that it has played.
+
+    Args:
+        log: CSV with a column t, lengths `length_1`, ... or angles `angle_1`, ... of the motors, and tensions
+            `tension_1`, ... if there are any; see `cspr_jax.config.cable_logs`.
+        plan: plan file, or a dictionary of what it holds.
+        tolerance: largest position error that is allowed after the delay, m; None: any.
+        max_delay: largest delay that is looked for, s, before and behind the plan.
+
+    Returns:
+        delay, errors of lengths and poses over time, cables that disagree or are slack.
+
+    Raises:
+        ConfigError: a mistake in a file, or a plan without a finite motion.
+    """
+    path = Path(log)
+    planned = plans.plan(plan)
+    if not np.isfinite(planned.answers.duration).all():
+        raise ConfigError(getattr(plan, "name", plan) if isinstance(plan, Path) else "plan", "has no finite motion")
+    with double_precision():
+        curves, pairs = curves_of(planned), planned.robot_file.pairs
+        robot = planned.problem.robot
+        read = read_cable_log(path, robot.n_cables if pairs is None else None, needs_times=True)
+        try:
+            lengths = _lengths(read, robot, pairs)
+        except InputError as error:
+            raise ConfigError(path, str(error)) from error
+        return _compared(path, planned, curves, read, lengths, tolerance, max_delay)
+
+
+def _lengths(read: CableLog, robot: Any, pairs: Any) -> np.ndarray:
+    # Lengths of the cables that the plan moves, with gaps; of pairs their mean.
+    values = np.asarray(read.angles if read.lengths is None else read.lengths)
+    if read.lengths is None:
+        is_given = np.isfinite(values)
+        values = np.where(is_given, lengths_of(robot, np.where(is_given, values, 0.0), is_angle=True), np.nan)
+    if pairs is not None and values.shape[1] == 2 * robot.n_cables:
+        values = values[:, pairs.cables].mean(2)
+    if values.shape[1] != robot.n_cables:
+        raise InputError("columns", values.shape[1], f"{robot.n_cables}, one a cable")
+    return values
+
+
+def _compared(
+    path: Path,
+    planned: plans.Plan,
+    curves: PlanCurves,
+    read: CableLog,
+    lengths: np.ndarray,
+    tolerance: float | None,
+    max_delay: float,
+) -> LogComparison:
+    times, warnings = np.asarray(read.times), [*planned.warnings, *read.notes]
+    if not (-max_delay <= times[0] <= curves.duration + max_delay):
+        warnings.append(f"times begin at {times[0]:.9g} s: counted from the first row")
+        times = times - times[0]
+    rows = np.flatnonzero(np.isfinite(lengths).all(1) & (lengths > 0.0).all(1))
+    if not len(rows):
+        raise ConfigError(path, "every row has gaps: must have a row with numbers for all cables")
+    delay = delay_of(times, lengths, curves.lengths, curves.rates, min(max_delay, curves.duration))
+    if delay.is_at_edge:
+        warnings.append(f"the delay is at the end of what was looked for, {max_delay:g} s: --max-delay looks farther")
+    shift = 0.0 if np.isnan(delay.value) else delay.value
+    robot = centred(planned.problem.robot)[0]
+    search = Search(robot, np.ones(robot.n_cables), None, np.zeros(3))
+    positions, quaternions = curves.poses(times[rows] - shift)
+    poses = search.near(lengths[rows], positions, quaternions)
+    found, turned = poses.positions[:, 0], poses.quaternions[:, 0]
+    before = np.linalg.norm(found - curves.poses(times[rows])[0], axis=1)
+    after = np.linalg.norm(found - positions, axis=1)
+    cosine = np.minimum(np.abs((turned * quaternions).sum(1)), 1.0)
+    angle = 2.0 * np.arccos(cosine) if search.row.is_body else None
+    picked = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(int))
+    disagreement, longer = _disagreement(search, poses, picked)
+    tension, slack = _slack(read, curves, times, shift)
+    lengthened: list[list[tuple[float, float]]] = [[] for _ in range(robot.n_cables)]
+    if longer is not None:
+        lengthened = [intervals(times[rows[picked]], longer[:, k]) for k in range(robot.n_cables)]
+    return LogComparison(
+        robot=planned.robot_file.name,
+        family=str(planned.keys.family),
+        times=times,
+        rows=rows,
+        delay=delay,
+        length_errors=lengths - curves.lengths(times - shift),
+        position_errors_before=before,
+        position_errors=after,
+        angle_errors=angle,
+        found=poses.is_found[:, 0],
+        residuals=poses.residuals[:, 0],
+        disagreement=disagreement,
+        n_spare=robot.n_cables - robot.dof,
+        tensions=tension,
+        planned_tensions=curves.tensions(times - shift),
+        slack=slack,
+        lengthened=lengthened,
+        tolerance=tolerance,
+        warnings=tuple(warnings),
+    )
+
+
+def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, np.ndarray | None]:
+    robot = search.robot
+    if robot.n_cables == robot.dof:
+        return None, None
+    cases = poses.positions[picked, 0], poses.quaternions[picked, 0]
+    matrices = in_batches(lambda x: geometry.wrench_matrices(robot, *x), cases, batch_size=BATCH)
+    matrices = matrices / np.where(geometry.scales(robot), search.radius, 1.0)[:, None]
+    measured = -poses.residuals[picked, 0]
+    disagreement = disagreement_of(matrices, measured)
+    if robot.n_cables < robot.dof + 2:
+        return disagreement, None
+    constant = np.zeros(robot.n_cables)
+    if disagreement.cable is not None:
+        constant[disagreement.cable] = disagreement.errors[disagreement.cable]
+    rest = measured - constant
+    spread = 1.4826 * float(np.median(np.abs(measured)))
+    threshold = DEVIATIONS * spread + SMALLEST * search.size
+    return disagreement, longer_rows(matrices, rest, threshold)
+
+
+def _slack(
+    read: CableLog, curves: PlanCurves, times: np.ndarray, shift: float
+) -> tuple[np.ndarray | None, list[list[tuple[float, float]]] | None]:
+    tensions, planned = read.tensions, curves.tensions(times - shift)
+    if tensions is None or tensions.shape != planned.shape:
+        return None, None
+    with np.errstate(invalid="ignore"):
+        is_slack = tensions <= SLACK * planned
+    return tensions, [intervals(times, is_slack[:, k]) for k in range(tensions.shape[1])]
