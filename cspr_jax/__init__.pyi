@@ -36,6 +36,7 @@ from cspr_jax.api.files.listings import list_examples as list_examples
 from cspr_jax.api.files.listings import list_quantities as list_quantities
 from cspr_jax.api.files.listings import list_robots as list_robots
 from cspr_jax.api.files.listings import new_file as new_file
+from cspr_jax.api.files.logs import compare_log as compare_log
 from cspr_jax.api.files.pictures import plot as plot
 from cspr_jax.api.files.published import benchmark as benchmark
 from cspr_jax.api.files.published import list_tables as list_tables
@@ -47,7 +48,6 @@ from cspr_jax.api.files.reports import report as report
 from cspr_jax.api.files.simulations import Simulation as Simulation
 from cspr_jax.api.files.simulations import simulate as simulate
 from cspr_jax.api.forward_kinematics import forward as forward
-from cspr_jax.api.files.logs import compare_log as compare_log
 from cspr_jax.api.many_checks import check_many as check_many
 from cspr_jax.api.plans import plan as plan
 from cspr_jax.api.retiming import retime as retime

@@ -11,7 +11,19 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cspr_jax import __version__
-from cspr_jax.cli import calibration, checks, listings, logs, machine, pictures, plans, published, simulations, stops, sweeps
+from cspr_jax.cli import (
+    calibration,
+    checks,
+    listings,
+    logs,
+    machine,
+    pictures,
+    plans,
+    published,
+    simulations,
+    stops,
+    sweeps,
+)
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
 from cspr_jax.outputs.plots.style.options import with_widths

@@ -1,10 +1,9 @@
 """Commands for measured cable lengths: locate, log."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from cspr_jax.cli.command import (
     Command,
@@ -49,7 +48,7 @@ def numbers_of(option: str, text: str, counts: tuple[int, ...] = ()) -> list[flo
         values = [float(word) for word in words]
     except ValueError:
         values = [float("nan")]
-    if not np.isfinite(values).all() or (counts and len(values) not in counts):
+    if not all(map(math.isfinite, values)) or (counts and len(values) not in counts):
         many = f"{' or '.join(map(str, counts))} " if counts else ""
         raise ConfigError(option, f"{text}: must be {many}finite numbers, separated by commas")
     return values

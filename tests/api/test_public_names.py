@@ -16,12 +16,8 @@ from support.folder import PLAN, SWEEP, folder
 
 import cspr_jax
 from cspr_jax import cli
-<<<<<<< HEAD
 from cspr_jax.api import calibration, plans, sizing
-=======
-from cspr_jax.api import plans
 from cspr_jax.api.files.logs import LogComparison
->>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -39,14 +35,11 @@ FUNCTIONS = {
     "check": ("check",),
     "calibrate": ("calibrate",),
     "replay": ("replay",),
-<<<<<<< HEAD
     "simulate": ("simulate",),
     "stops": ("stops",),
     "size": ("size", "check"),
-=======
     "locate": ("forward",),
     "log": ("compare_log",),
->>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
@@ -81,11 +74,8 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.Stops.plot] if name == "stops" else []
         functions += [sizing.Sizes.plot] if name == "size" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
-<<<<<<< HEAD
         functions += [calibration.Calibration.save] if name == "calibrate" else []
-=======
         functions += [LogComparison.page] if name == "log" else []
->>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
@@ -102,13 +92,10 @@ def test_every_command_has_its_function():
         known |= {"elastic"} if name == "replay" else set()  # a function of its own
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
-        own |= {"plan": "plan"} if name in ("plot", "report") else {}
+        own |= {"plan": "plan"} if name in ("plot", "report", "log") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
-<<<<<<< HEAD
         own |= {"output": "path"} if name == "calibrate" else {}
-=======
         own |= {"file": "lengths", "all": "all_solutions", "slack": "equilibrium"} if name == "locate" else {}
->>>>>>> eaebb813 (Find poses of equilibrium, locate robots, and compare logs of machines with plans)
         known |= {"slower"} if name == "check" else set()  # a method of what is checked
         known |= {"output"} if name == "locate" else set()  # a table of the answers
         known |= {"retime"} if name in ("plan", "check") else set()  # a function of what is planned or checked

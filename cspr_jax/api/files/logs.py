@@ -18,9 +18,9 @@ from cspr_jax.machine.logs.delay import delay_of
 from cspr_jax.machine.logs.disagreement import disagreement_of, intervals, longer_rows
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import double_precision
-from cspr_jax.outputs import log_report
-from cspr_jax.outputs.log_report import ComparedLog
-from cspr_jax.outputs.plan_curves import PlanCurves, curves_of
+from cspr_jax.outputs.logs import log_report
+from cspr_jax.outputs.logs.log_report import ComparedLog
+from cspr_jax.outputs.logs.plan_curves import PlanCurves, curves_of
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import check_writable, publish
@@ -34,7 +34,7 @@ ROWS, BATCH = 4000, 1024  # rows of which disagreement is judged
 
 
 class LogComparison(ComparedLog):
-    """A log beside its plan; see `cspr_jax.outputs.log_report.ComparedLog` for its fields."""
+    """A log beside its plan; see `cspr_jax.outputs.logs.log_report.ComparedLog` for its fields."""
 
     def to_dict(self) -> dict[str, Any]:
         """The comparison as plain values.

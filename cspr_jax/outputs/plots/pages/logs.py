@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.outputs.log_report import ComparedLog, log_lines
+from cspr_jax.outputs.logs.log_report import ComparedLog, log_lines
 from cspr_jax.outputs.plots.pages.page import packed
 
 MOST_ROWS = 4000
