@@ -11,7 +11,7 @@ from cspr_jax.api import plans
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.config.cable_logs import CableLog, read_cable_log
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import File, Positive
+from cspr_jax.errors.arguments import Kind, Positive
 from cspr_jax.machine.forward_kinematics.lengths import lengths_of
 from cspr_jax.machine.forward_kinematics.solutions import Search
 from cspr_jax.machine.logs.delay import delay_of
@@ -26,6 +26,10 @@ from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import check_writable, publish
 from cspr_jax.workspaces.poses import geometry
 
+PlanOrFile = Annotated[
+    str | Path | Mapping[str, Any] | plans.Plan,
+    Kind("the path of a plan file, a dictionary of what it holds, or a plan", (str, os.PathLike, Mapping), ("legs",)),
+]
 # A cable counts as slack where its measured tension is below this fraction of the planned one.
 SLACK = 0.05
 # Residuals that make a cable longer than the others imply: so many robust deviations, and a fraction of the size.
@@ -91,14 +95,14 @@ class LogComparison(ComparedLog):
 
 @checked()
 def compare_log(
-    log: str | Path, plan: File, *, tolerance: Positive | None = None, max_delay: Positive = 2.0
+    log: str | Path, plan: PlanOrFile, *, tolerance: Positive | None = None, max_delay: Positive = 2.0
 ) -> LogComparison:
     """Compare a recorded log of a machine with the plan that it has played.
 
     Args:
         log: CSV with a column t, lengths `length_1`, ... or angles `angle_1`, ... of the motors, and tensions
             `tension_1`, ... if there are any; see `cspr_jax.config.cable_logs`.
-        plan: plan file, or a dictionary of what it holds.
+        plan: plan file, a dictionary of what it holds, or a plan.
         tolerance: largest position error that is allowed after the delay, m; None: any.
         max_delay: largest delay that is looked for, s, before and behind the plan.
 
@@ -109,9 +113,9 @@ def compare_log(
         ConfigError: a mistake in a file, or a plan without a finite motion.
     """
     path = Path(log)
-    planned = plans.plan(plan)
+    planned = plan if isinstance(plan, plans.Plan) else plans.plan(plan)
     if not np.isfinite(planned.answers.duration).all():
-        raise ConfigError(getattr(plan, "name", plan) if isinstance(plan, Path) else "plan", "has no finite motion")
+        raise ConfigError(plan if isinstance(plan, str | Path) else "plan", "has no finite motion: see its verdict")
     with double_precision():
         curves, pairs = curves_of(planned), planned.robot_file.pairs
         robot = planned.problem.robot
