@@ -23,6 +23,7 @@ _MODULES = {
     "WorkspaceVolume": "outputs.volumes",
     "accessible": "api.families.platform_searches",
     "amplitude": "api.families.motions",
+    "anchors": "api.files.anchors",
     "attainable": "api.families.platform_searches",
     "available_accelerations": "api.workspaces",
     "benchmark": "api.files.published",

@@ -29,6 +29,7 @@ from cspr_jax.api.families.platform_searches import minimum_pose_arcs as minimum
 from cspr_jax.api.families.searches import minimum_arcs as minimum_arcs
 from cspr_jax.api.families.searches import minimum_oscillations as minimum_oscillations
 from cspr_jax.api.families.swing_ranges import swing_range as swing_range
+from cspr_jax.api.files.anchors import anchors as anchors
 from cspr_jax.api.files.imports import ImportedRobot as ImportedRobot
 from cspr_jax.api.files.imports import import_robot as import_robot
 from cspr_jax.api.files.listings import copy_examples as copy_examples

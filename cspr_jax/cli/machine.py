@@ -1,4 +1,4 @@
-"""Commands at the machine: size, the smallest motors."""
+"""Commands at the machine: size, the smallest motors; anchors, lines for firmware."""
 
 import argparse
 from pathlib import Path
@@ -11,7 +11,9 @@ from cspr_jax.cli.command import (
     add_output,
     prepare_jax,
     print_json,
+    print_line,
     print_table,
+    warn,
 )
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
@@ -71,4 +73,37 @@ def _size(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
-COMMANDS = (Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),)
+def _add_anchors(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("robot", help="a catalogue name, or the path of a robot file")
+    parser.add_argument(
+        "--for",
+        dest="firmware",
+        choices=("hangprinter", "klipper"),
+        required=True,
+        help="hangprinter: lines M669 and M666 of RepRapFirmware; klipper: sections of its kinematics winch",
+    )
+    parser.add_argument(
+        "--origin",
+        type=float,
+        nargs=3,
+        default=(0.0, 0.0, 0.0),
+        metavar=("X", "Y", "Z"),
+        help="point at which the machine is homed, in the axes of the robot file, m (default: their origin)",
+    )
+    add_all_errors(parser)
+
+
+def _anchors(options: argparse.Namespace) -> int:
+    from cspr_jax.api.files.anchors import anchors
+
+    for line in anchors(options.robot, firmware=options.firmware, origin=options.origin):
+        print_line(line)
+    if options.origin == (0.0, 0.0, 0.0):
+        warn("hint: the machine is taken to be homed at the origin of the robot file; --origin names another point")
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),
+    Command("anchors", "print anchors and drums as the firmware of a controller reads them", _add_anchors, _anchors),
+)

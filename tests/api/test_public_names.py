@@ -40,6 +40,7 @@ FUNCTIONS = {
     "size": ("size", "check"),
     "locate": ("forward",),
     "log": ("compare_log",),
+    "anchors": ("anchors",),
     "plot": ("plot", "open_result"),
     "report": ("report",),
     "table": ("table", "list_tables"),
