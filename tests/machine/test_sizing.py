@@ -170,9 +170,9 @@ def test_pictures_show_lines_and_limits(sized):
     limits |= {"motor_speed_max": np.full(3, 200.0), "motor_power_max": np.full(3, 8.0)}
     figure = torque_speed_figure("r", sized.curves, sized.required, 2.0, limits)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words[1:] == ["2 times the largest", "line of the motor", "limits", "limit of power"]
+    assert words[1:] == ["2 times it", "2 times the largest", "line of the motor", "limits", "limit of power"]
     for k, panel in enumerate(figure.axes):
-        box = panel.lines[1].get_xydata()
+        box = panel.lines[2].get_xydata()
         np.testing.assert_allclose(box.max(0), [sized.required["speed"][k], sized.required["torque"][k]])
 
 

@@ -34,15 +34,13 @@ def torque_speed_figure(
         if k >= count:
             panel.set_visible(False)
             continue
-        _draw(panel, k, curves, required, limits)
+        _draw(panel, k, curves, factor, required, limits)
         panel.set_title(f"motor {k + 1}")
-        if k % columns == 0:
-            panel.set_ylabel("winding torque (N m)")
-        if k + columns >= count:
-            panel.set_xlabel("winding speed (rad/s)")
+    figure.supxlabel("winding speed (rad/s)", fontsize="medium")
+    figure.supylabel("winding torque (N m)", fontsize="medium")
     handles = _handles(list(curves), factor, limits)
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), columns + 1))
-    figure.suptitle(f"{shortened(robot)}: torque over speed of the motors, and the box of {factor:g} times the largest")
+    figure.suptitle(f"{shortened(robot)}: torque over speed of the motors, safety factor {factor:g}")
     return figure
 
 
@@ -50,12 +48,15 @@ def _draw(
     panel: Axes,
     k: int,
     curves: Mapping[str, Mapping[str, np.ndarray]],
+    factor: float,
     required: Mapping[str, np.ndarray],
     limits: Mapping[str, np.ndarray],
 ) -> None:
     torque, speed = float(required["torque"][k]), float(required["speed"][k])
     for number, curve in enumerate(curves.values()):
-        panel.plot(curve["speed"][:, k], curve["torque"][:, k], linewidth=1.1, **line_style(number))
+        speeds, torques = curve["speed"][:, k], curve["torque"][:, k]
+        panel.plot(speeds, torques, linewidth=1.2, **line_style(number))
+        panel.plot(factor * speeds, factor * torques, linewidth=0.8, alpha=0.45, **line_style(number))
     panel.plot(
         [-speed, speed, speed, -speed, -speed],
         [-torque, -torque, torque, torque, -torque],
@@ -96,6 +97,7 @@ def _hyperbola(panel: Axes, power: float, right: float, top: float) -> None:
 
 def _handles(names: Sequence[str], factor: float, limits: Mapping[str, np.ndarray]) -> list[Line2D]:
     handles = [Line2D([], [], linewidth=1.1, label=shortened(name), **line_style(k)) for k, name in enumerate(names)]
+    handles.append(Line2D([], [], color=COLOURS[0], linewidth=0.8, alpha=0.45, label=f"{factor:g} times it"))
     box = f"{factor:g} times the largest"
     handles.append(Line2D([], [], color="black", linewidth=0.9, linestyle=":", label=box))
     if "line" in limits:
