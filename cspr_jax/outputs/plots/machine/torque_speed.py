@@ -36,11 +36,13 @@ def torque_speed_figure(
             continue
         _draw(panel, k, curves, factor, required, limits)
         panel.set_title(f"motor {k + 1}")
-    figure.supxlabel("winding speed (rad/s)", fontsize="medium")
-    figure.supylabel("winding torque (N m)", fontsize="medium")
+        if k % columns == 0:
+            panel.set_ylabel("torque (N m)")
+        if k + columns >= count:
+            panel.set_xlabel("speed (rad/s)")
     handles = _handles(list(curves), factor, limits)
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), columns + 1))
-    figure.suptitle(f"{shortened(robot)}: torque over speed of the motors, safety factor {factor:g}")
+    figure.suptitle(f"{shortened(robot)}: winding torque over winding speed, safety factor {factor:g}")
     return figure
 
 
