@@ -117,6 +117,9 @@ def check_many(  # noqa: PLR0913
                 raise InputError(
                     f"motion {i}, {error.key}", error.value, error.allowed, problem=error.problem
                 ) from error
+        if problem.limits.motor_torque_rms_max is not None:
+            limit = np.asarray(problem.limits.motor_torque_rms_max).tolist()
+            raise InputError("limits.motor_torque_rms_max", limit, "absent for many motions (check does one)")
         batch, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
         proofs = proofs_of(problem, batch.bounds, batch.durations, scene, batch.jumps)
         answers = with_attained(problem, answers_of(proofs, batch.durations), motions, scene)

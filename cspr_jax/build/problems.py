@@ -7,7 +7,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.amplitudes import Amplitude, boundary_errors
-from cspr_jax.motion.given_limits import check_bounded, check_certain
+from cspr_jax.motion.given_limits import check_bounded, check_certain, check_motors
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -58,6 +58,7 @@ def build_problem(
         if not is_redundant_platform(robot):
             check_bounded(limit_values)
         check_certain(robot, limit_values, spec.families, in_pairs=robot_file.pairs is not None)
+        check_motors(robot, limit_values)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, limit_values, amplitude)

@@ -195,6 +195,10 @@ class RobotFile(LimitKeys):
             raise InputError(f"winch.{name}", None, "equal for both", problem=problem)
         return pairs
 
+    def limit(self, name: str) -> Any:
+        """A limit of the robot, or of its winches; None: there is none."""
+        return getattr(self, name, None if self.winch is None else self.winch.limits.get(name))
+
     @property
     def as_written(self) -> "RobotFile":
         """The robot of the file: the platform, if this is its equivalent point mass."""

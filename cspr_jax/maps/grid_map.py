@@ -12,7 +12,8 @@ from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import ConfigError
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motion.given_limits import check_no_motors
 from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.shapes import Bool, Float
@@ -36,6 +37,7 @@ class GridMap(abc.ABC):
 
     Fields:
         any_cables: whether the robot may have more cables than degrees of freedom.
+        motors: whether its verdicts take limits of winches into account.
         proves: whether its verdicts are proved, except those that say that they are not.
 
     Raises:
@@ -43,6 +45,7 @@ class GridMap(abc.ABC):
     """
 
     any_cables: ClassVar[bool] = False
+    motors: ClassVar[bool] = False
     proves: ClassVar[bool] = False
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object, *, for_bounds: bool = False) -> None:
@@ -58,6 +61,11 @@ class GridMap(abc.ABC):
             for_bounds=for_bounds,
             any_cables=self.any_cables,
         )
+        if not self.motors:
+            try:
+                check_no_motors(self._problem.limits)
+            except InputError as error:
+                raise ConfigError(file, str(error)) from error
 
     def _scene_or_none(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None without obstacles and without a shape of the platform.

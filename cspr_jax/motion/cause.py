@@ -26,6 +26,13 @@ _WORDS[Verdict.OVER_FEED] = "the mass centre needs {needed} {unit}{when}, the fe
 _WORDS |= dict.fromkeys(
     (row.flag for row in LIMITS if row.of_mass_centre), "the mass centre needs {needed} {unit}{when}, {allowed} allowed"
 )
+_WORDS |= {row.flag: "motor {numbers} needs {needed} {unit}{when}, {allowed} allowed" for row in LIMITS if row.of_winch}
+_WORDS[Verdict.MOTOR_OVER_TORQUE_RMS] = (
+    "motor {numbers} needs {needed} {unit} as root mean square over the full motion, {allowed} allowed"
+)
+_OF_MOTORS = {row.flag: "its " + row.description.removesuffix(" of the motor") for row in LIMITS if row.of_winch}
+# Redundant cables, whose tensions can be chosen.
+_TOGETHER = "the tensions at which each motor keeps {quantity} miss their limits by {missed} {unit}{when}"
 UNITS = {flag: row.unit for flag, row in CRITERIA.items()} | {Verdict.UNCERTAINTY: "1"}
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 
@@ -71,7 +78,10 @@ class Cause:
         if flag is Verdict.ABOVE_SPOOLS and not -self.needed > ON_PLANE:
             return f"on the plane of the spools{when}"
         needed, allowed = _told_apart(self.needed, self.allowed)
-        return _WORDS.get(flag, _USUAL).format(
+        is_together = not self.cables and flag in _OF_MOTORS
+        return (_TOGETHER if is_together else _WORDS.get(flag, _USUAL)).format(
+            quantity=_OF_MOTORS.get(flag, ""),
+            numbers=numbers,
             cable=f"cable{'s' if len(self.cables) > 1 else ''} {numbers}",
             needed=needed,
             allowed=allowed,

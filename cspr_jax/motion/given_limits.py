@@ -15,6 +15,7 @@ from cspr_jax.robots.model.limits import NO_LIMITS, Limits, Uncertainty
 from cspr_jax.robots.model.parallel_pairs import ParallelPairs
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.winch_numbers import LINE, LOAD
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
@@ -27,6 +28,8 @@ def limits_of(
     for row in LIMITS:
         value = limits.get(row.name)
         value = defaults.get(row.name) if value is None else value
+        if row.of_winch and value is not None:
+            _check_winch(robot, row, value, at)
         values[row.name] = None if value is None else _limit(row, value, n_cables, at)
     low, high = values["tension_min"], values["tension_max"]
     if low is not None and high is not None and not (low < high).all():
@@ -37,6 +40,15 @@ def limits_of(
     uncertain = limits.get("uncertainty")
     uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
     return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
+
+
+def _check_winch(robot: Any, row: Limit, value: Any, at: str) -> None:
+    # Robots of kernels have `winches`, those of files `winch`, with the same numbers.
+    winch = getattr(robot, "winches", None) or getattr(robot, "winch", None)
+    if winch is None:
+        raise InputError(f"{at}{row.name}", value, "absent: the robot has no winches ([winch] in its file)")
+    if row.name == LOAD and getattr(winch, LINE, None) is None and getattr(winch, "stall_torque", None) is None:
+        raise InputError(f"{at}{row.name}", value, f"absent: the robot's winches have no {LINE}")
 
 
 def _narrowed(values: Mapping[str, Any], margin: float | None, n_cables: int, at: str) -> dict[str, Any]:
@@ -81,6 +93,26 @@ def check_of_motion(limits: Limits) -> None:
             raise InputError(row.name, float(value), "absent where no motion is checked")
 
 
+def check_no_motors(limits: Limits, at: str = "") -> None:
+    """Refuse limits of winches where no proof takes them into account."""
+    for row in LIMITS:
+        value = getattr(limits, row.name)
+        if row.of_winch and value is not None:
+            why = "absent (what is asked for does not exist yet for limits of winches: plans, checks and some maps do)"
+            raise InputError(f"{at}{row.name}", np.unique(np.asarray(value)).tolist(), why)
+
+
+def check_motors(robot: PointMassRobot | PlatformRobot, limits: Limits) -> None:
+    """Refuse limits of winches that cannot be proved."""
+    given = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
+    if given and limits.uncertainty is not None:
+        raise InputError("uncertainty", None, f"absent beside {given[0]}, a limit of winches", problem="given")
+    if limits.motor_torque_rms_max is not None and robot.n_cables > robot.dof:
+        value = np.asarray(limits.motor_torque_rms_max).tolist()
+        allowed = "absent on more cables than degrees of freedom, since a motion does not determine their torques"
+        raise InputError("motor_torque_rms_max", value, allowed)
+
+
 def check_certain(
     robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
 ) -> None:
@@ -119,7 +151,9 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
 def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     """Limits of the equivalent's three cables, from those of the pairs of six cables."""
     values: dict[str, Any] = {
-        row.name: as_float64(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
+        row.name: _on_winches(row, value, pairs)
+        if row.of_winch
+        else as_float64(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
         for row in LIMITS
         if row.per_cable and (value := getattr(limits, row.name)) is not None
     }
@@ -134,18 +168,29 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     return dataclasses.replace(limits, **values)
 
 
+def _on_winches(row: Limit, value: Any, pairs: ParallelPairs) -> Array:
+    # One winch drives a pair of cables, so that both have its limits.
+    each = np.asarray(value)[pairs.cables]
+    if (each[:, 0] != each[:, 1]).any():
+        problem = "cables of a pair are on one winch, but their limits differ"
+        raise InputError(row.name, None, "equal for both", problem=problem)
+    return as_float64(each[:, 0])
+
+
 def limits_over(
     robot: PointMassRobot | PlatformRobot,
     limits: Limits | None,
     *,
     any_tensions: bool = False,
     families: tuple[str, ...] = (),
+    motors: bool = False,
 ) -> Limits:
-    """Limits in the kernels' axes, with those of a robot where none are given."""
+    """Limits in the kernels' axes, with those of a robot where none are given; without `motors` those are refused."""
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(merged)
     if not families:
         check_of_motion(merged)
     check_certain(robot, merged, families)
+    (check_motors(robot, merged) if motors else check_no_motors(merged))
     return merged

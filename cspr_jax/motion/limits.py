@@ -19,11 +19,29 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
+from cspr_jax.schema.verdicts import Verdict
 
 
 def limits_set(limits: Limits) -> tuple[Limit, ...]:
-    """Rows of the limits that are set, in the order of their slacks."""
-    return tuple(row for row in LIMITS if getattr(limits, row.name) is not None)
+    """Rows of the limits that are set, without those of winches, in the order of their slacks."""
+    return tuple(row for row in LIMITS if getattr(limits, row.name) is not None and not row.of_winch)
+
+
+def motor_limits_set(limits: Limits) -> tuple[Limit, ...]:
+    """Rows of the limits of winches that are set and bound each time, in the order of their slacks."""
+    names = [row.name for row in LIMITS if row.of_winch and row.flag != Verdict.MOTOR_OVER_TORQUE_RMS]
+    return tuple(row for row in LIMITS if row.name in names and getattr(limits, row.name) is not None)
+
+
+def has_motor_limits(limits: Limits) -> bool:
+    """Tell whether limits of winches are set."""
+    return bool(motor_limits_set(limits)) or limits.motor_torque_rms_max is not None
+
+
+def without_motors(limits: Limits) -> Limits:
+    """Limits without those of winches."""
+    names = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
+    return dataclasses.replace(limits, **dict.fromkeys(names)) if names else limits
 
 
 def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:
@@ -33,7 +51,8 @@ def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndar
 
 def touchable_limits(robot: AnyRobot, limits: Limits) -> Limits:
     """Limits widened by `allowance`, for proofs: a motion that touches a limit keeps it."""
-    values = {row: np.asarray(getattr(limits, row.name), float) for row in limits_set(limits)}
+    rows = (*limits_set(limits), *motor_limits_set(limits))
+    values = {row: np.asarray(getattr(limits, row.name), float) for row in rows}
     signs = {"most": 1.0, "least": -1.0}
     wider: dict[str, Any] = {
         row.name: limit + signs[row.sense] * allowance(row, limit, robot) for row, limit in values.items()

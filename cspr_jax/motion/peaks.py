@@ -1,4 +1,4 @@
-"""Peaks of motions: extremes of tensions, heights, cable lengths and speeds along them."""
+"""Peaks of motions: extremes of tensions, heights, cable lengths and speeds, and of motors, along them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.motion.limits import lowest_depth
+from cspr_jax.motion.limits import lowest_depth, motor_limits_set
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.minima import narrowed_times
@@ -21,6 +21,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.robots.model.winches import MotorDemands, motor_demands
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
@@ -29,6 +30,9 @@ SAMPLES = 64  # smallest number of samples of an arc
 BATCH = 512  # number of samples computed at a time
 # Largest number of samples that is held at a time.
 MAX_SAMPLES = 200_000
+# Points of Gauss's rule between two samples, and their weights.
+_GAUSS = np.polynomial.legendre.leggauss(3)
+TINY = 1e-300
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +53,11 @@ class Peaks:
         tension_margin: smallest distance of tensions from their limits; of redundant cables, whose tensions can be
             chosen, that of the most central ones, N.
         are_found: whether the tension rule of redundant cables kept the limits at all times; 1 or 0.
+        motor_speed: largest speed of a motor, rad/s; these five are NaN without winches.
+        motor_torque: largest torque of a motor, at standstill in the worse direction of friction, N m.
+        motor_power: largest power of a motor, driving or braking, W.
+        motor_load: largest torque over stall torque plus speed over no-load speed; NaN without such a line.
+        motor_torque_rms: largest root mean square of a motor's torque over the motion, N m.
         samples: number of times at which the motion was sampled.
         when: time at which each of the extremes above is attained, (n, n_extremes), s.
         cables: which cable attains it, from 0 on; -1: none.
@@ -66,14 +75,25 @@ class Peaks:
     mass_centre_acceleration: np.ndarray
     tension_margin: np.ndarray
     are_found: np.ndarray
+    motor_speed: np.ndarray
+    motor_torque: np.ndarray
+    motor_power: np.ndarray
+    motor_load: np.ndarray
+    motor_torque_rms: np.ndarray
     samples: np.ndarray
     when: np.ndarray
     cables: np.ndarray
 
 
 # A maximum is searched for as the minimum of the negative.
-_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
 EXTREMES = [field.name for field in dataclasses.fields(Peaks)][: len(_SIGNS)]
+OF_MOTORS = len(MotorDemands._fields)
+
+
+def _names(robot: Any) -> list[str]:
+    # Extremes that a robot has; those of motors are the last ones.
+    return EXTREMES if robot.winches is not None else EXTREMES[:-OF_MOTORS]
 
 
 @persistent_jit(static_argnames="rule")
@@ -106,6 +126,9 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
         "acceleration_max": -jnp.abs(rate_derivative),
         "tension_margin": jnp.minimum(central - smallest, largest - central),
     }
+    if robot.winches is not None:
+        demands = motor_demands(robot.winches, (length, rate, rate_derivative), force)
+        of_cables |= {name: -values for name, values in demands._asdict().items()}
     extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
         "depth_min": plane_normal(robot) @ state.position,
         "lowest": -lowest_depth(robot, state, corners),
@@ -115,7 +138,7 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
     }
     nearest = dict.fromkeys(EXTREMES, jnp.asarray(-1.0))
     nearest |= {name: jnp.argmin(values).astype(float) for name, values in of_cables.items()}
-    return jnp.stack([table[name] for table in (extremes, nearest) for name in EXTREMES])
+    return jnp.stack([table[name] for table in (extremes, nearest) for name in _names(robot)])
 
 
 def peaks(
@@ -128,8 +151,9 @@ def peaks(
 ) -> Peaks:
     """Extremes along motions, narrowed down between samples."""
     # Give every limit of tensions a value, so that one compiled function serves all.
-    limits = Limits(*tension_range(robot, limits))
-    table = np.empty((len(motions), 3, len(EXTREMES)))
+    low, high = tension_range(robot, limits)
+    limits = dataclasses.replace(_of_motors(robot, limits), tension_min=low, tension_max=high)
+    table = np.empty((len(motions), 3, len(_names(robot))))
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
@@ -146,13 +170,52 @@ def peaks(
             table[batch] = _of_alike(
                 robot, limits, corners, rule, [motions[i] for i in batch], [times[i] for i in batch]
             )
+    missing = np.full((len(motions), 3, len(EXTREMES) - table.shape[2]), np.nan)
+    missing[:, 2] = -1.0
+    table = np.concatenate([table, missing], axis=2)
     columns = (table[:, 0] * _SIGNS + 0.0).T  # no -0
+    if robot.winches is None or robot.winches.stall_torque is None:
+        columns[EXTREMES.index("motor_load")] = np.nan
     return Peaks(
         **dict(zip(EXTREMES, columns, strict=True)),
+        motor_torque_rms=_motor_torque_rms(robot, motions, times, limits, rule),
         samples=np.array([len(tau) for tau in times]),
         when=table[:, 1] * np.array([[float(motion.duration())] for motion in motions]),
         cables=table[:, 2].astype(int),
     )
+
+
+def _of_motors(robot: Any, limits: Limits) -> Limits:
+    # Limits of winches narrow the tensions among which a rule chooses.
+    if robot.winches is None or robot.n_cables == robot.dof:
+        return NO_LIMITS
+    rows = motor_limits_set(limits)
+    return Limits(**{row.name: getattr(limits, row.name) for row in rows})
+
+
+def _motor_torque_rms(
+    robot: Any, motions: Sequence[Motion], times: Sequence[np.ndarray], limits: Limits, rule: str
+) -> np.ndarray:
+    # Integrate squares of torques between samples by Gauss's rule, whose points avoid the jumps of friction at samples.
+    largest = np.full(len(motions), np.nan)
+    for i, (motion, tau) in enumerate(zip(motions, times, strict=True) if robot.winches is not None else ()):
+        width, middle = 0.5 * np.diff(tau), 0.5 * (tau[1:] + tau[:-1])
+        points = (middle[:, None] + width[:, None] * _GAUSS[0]).ravel()
+        kernel = partial(_squared_torques, robot, limits, common_shape(motion), rule=rule)
+        squares = in_batches(kernel, points, batch_size=BATCH)
+        means = (width[:, None] * _GAUSS[1]).ravel() @ squares / max(tau[-1] - tau[0], TINY)
+        largest[i] = np.sqrt(means.max())
+    return largest
+
+
+@persistent_jit(static_argnames="rule")
+def _squared_torques(robot, limits: Limits, motion: Motion, tau: Array, *, rule: str) -> Array:
+    def one(time: Array) -> Array:
+        state = motion.state(time)
+        tensions = cables.tensions(robot, state, limits, rule)
+        return motor_demands(robot.winches, cables.cable_motion(robot, state), tensions).motor_torque ** 2
+
+    return jax.vmap(one)(tau)
 
 
 def _of_alike(
@@ -165,7 +228,7 @@ def _of_alike(
         def along(tau: np.ndarray) -> np.ndarray:
             return in_batches(of_one, tau.ravel(), batch_size=BATCH).reshape(*tau.shape, -1)
 
-        return _narrowed(along, times[0][None])
+        return _narrowed(along, times[0][None], len(_names(robot)))
     kernel = partial(_values, robot, limits, corners, rule=rule)
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(array, float) for array in leaves]), *motions)
 
@@ -175,11 +238,10 @@ def _of_alike(
         values = in_batches(kernel, (items, tau.ravel()), batch_size=BATCH)
         return values.reshape(*tau.shape, -1)
 
-    return _narrowed(at, np.stack(times))
+    return _narrowed(at, np.stack(times), len(_names(robot)))
 
 
-def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
-    count = len(EXTREMES)
+def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, count: int) -> np.ndarray:
     minimum, when = narrowed_times(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
     nearest = np.diagonal(at(when)[..., count:], axis1=1, axis2=2)
     return np.stack([minimum, when, nearest], axis=1)

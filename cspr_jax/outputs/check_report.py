@@ -21,7 +21,7 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
-from cspr_jax.verification.criteria import Criterion
+from cspr_jax.verification.criteria import Criterion, bounds_tensions
 from cspr_jax.verification.proved_answers import MotionProof
 
 SCHEMA = 1
@@ -105,8 +105,13 @@ def _sampled_peaks(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
     if plan.is_redundant:
         low, high = tension_range(plan.problem.robot, plan.problem.limits)
         rows |= {Verdict.SLACK_CABLE: ("tension_min", "N", low), Verdict.OVER_TENSION: ("tension_max", "N", high)}
-    free = (row for row in LIMITS if row.of_mass_centre and getattr(plan.problem.limits, row.name) is None)
+    limits, winches = plan.problem.limits, plan.problem.robot.winches
+    free = (row for row in LIMITS if row.of_mass_centre and getattr(limits, row.name) is None)
     rows |= {row.flag: (row.peak, row.unit, None) for row in free}
+    for row in LIMITS if winches is not None else ():
+        limit = getattr(limits, row.name) if row.of_winch else None
+        if row.of_winch and row.peak in EXTREMES and (limit is None or (plan.is_redundant and bounds_tensions(row))):
+            rows[row.flag] = (row.peak, row.unit, limit)
     table, count = {}, plan.problem.robot.n_cables
     for flag, (name, unit, allowed) in rows.items():
         cable = int(peaks.cables[0, EXTREMES.index(name)])

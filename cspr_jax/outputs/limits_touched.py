@@ -14,6 +14,7 @@ from cspr_jax.curves.interpolation import thinned
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.cause import Cause
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.proved_answers import MotionProof, cause_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
@@ -55,6 +56,8 @@ def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit
         return []
     rows: list[TouchedLimit] = []
     for k in np.argsort(case.proof.high / case.scales).tolist():
+        if case.criteria[k].flag == Verdict.MOTOR_OVER_TORQUE_RMS:  # a criterion of no single time
+            continue
         if abs(case.proof.high[k]) > NEAR * case.scales[k] or case.criteria[k].flag.text in [
             row.cause.criterion for row in rows
         ]:

@@ -53,6 +53,8 @@ def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
     problem = build_problem(robot_file, plan_file, plan_file, path, any_cables=True)
     if problem.limits.uncertainty is not None:
         raise ConfigError(path, "uncertainty: must be absent in a table of so many rows")
+    if problem.limits.motor_torque_rms_max is not None:
+        raise ConfigError(path, "motor_torque_rms_max: must be absent in a table of so many rows")
     frame, notes = frame_of(robot_file.base_points, robot_file.z_axis), dict[str, None]()
     try:
         windows = list(_windows(problem, robot_file, frame, plan_file, path, notes))
@@ -133,4 +135,5 @@ def _reduced(each: list[Peaks], starts: list[float]) -> Peaks:
     when = np.array([starts[k] + each[k].when[0, i] for i, k in enumerate(worst)])
     cables = np.array([each[k].cables[0, i] for i, k in enumerate(worst)])
     samples = np.array([sum(int(one.samples[0]) for one in each)])
+    columns["motor_torque_rms"] = np.array([np.nan])  # windows do not keep it for each motor
     return Peaks(**columns, samples=samples, when=when[None], cables=cables[None])

@@ -26,6 +26,7 @@ from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.elastic_cables import frequency_warnings, segment_frequencies
+from cspr_jax.plans.motor_torques import with_mean_torques
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -124,7 +125,7 @@ class PlannedMotions:
         """Smallest distance of tensions from their limits, (n,) N: from proofs, else by a search between samples."""
         margins = self.demands.tension_margin.copy()
         for i, proof in enumerate(self.answers.proof):
-            if proof is not None and not proof.contacts_alone:
+            if proof is not None and proof.parts.usual:
                 margins[i] = proof.margin
         return np.where(np.isfinite(self.answers.duration), margins, np.nan)
 
@@ -174,6 +175,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.waypoints.frame
     legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
+    legs = with_mean_torques(problem, legs, lambda: _scene(problem, sequence.waypoints))
     why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
     frequencies = segment_frequencies(problem, robot_file, frame, legs, plan_file, z0)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)] + frequency_warnings(frequencies)
@@ -214,17 +216,24 @@ def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> Join
     # Families prove feasible motions faster, but only the general proof says why a motion is not feasible.
     if leg.answers.feasible.all() and not any(proof is not None for proof in leg.answers.proof):
         return leg
-    # Imported here, since feasible plans do not need it.
-    from cspr_jax.build.scenes import scene_of_leg
-    from cspr_jax.verification.attained import with_attained
+    from cspr_jax.verification.attained import with_attained  # feasible plans do not need it
 
-    scene = scene_of_leg(problem.robot, waypoints)
+    scene = _scene(problem, waypoints)
     return dataclasses.replace(leg, answers=with_attained(problem, leg.answers, leg.motions, scene))
 
 
-def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:
+def _scene(problem: Problem, waypoints: Waypoints) -> Any:
+    from cspr_jax.build.scenes import scene_of_leg  # nor this
+
+    return scene_of_leg(problem.robot, waypoints)
+
+
+def with_motions(
+    plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str], scene: Any
+) -> PlannedMotions:
     """A plan with other motions between its poses."""
-    legs = (JoinedLeg(plan.keys.family, answers, motions),)
+    legs = with_mean_torques(plan.problem, [JoinedLeg(plan.keys.family, answers, motions)], lambda: scene)
+    answers = legs[0].answers
     why, extremes = _causes(plan.frame, legs), _extremes(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
     frequencies = segment_frequencies(plan.problem, plan.robot_file, plan.frame, legs, plan.keys, plan.z0)
     kept = [line for line in plan.warnings if line not in frequency_warnings(plan.frequencies)]

@@ -97,7 +97,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     chosen = [new if better else old for new, old, better in zip(trial, motions, is_better, strict=True)]
     lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
     lines += answers.notes("retime: ramp_time")
-    return with_motions(plan, with_attained(plan.problem, answers, chosen, scene), chosen, lines)
+    return with_motions(plan, with_attained(plan.problem, answers, chosen, scene), chosen, lines, scene)
 
 
 def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:

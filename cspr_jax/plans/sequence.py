@@ -20,6 +20,7 @@ from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.plans.verified_legs import verified
 from cspr_jax.schema.families import FAMILIES, moving
+from cspr_jax.schema.limits import LIMITS
 
 POINT_MASS = "3T"
 
@@ -65,11 +66,16 @@ class PlanLegs:
 
 
 def _verified(leg: Leg) -> Leg:
-    waypoints = leg.waypoints
+    plan_file, robot_file = leg.waypoints.plan_file, leg.waypoints.robot_file
     return verified(
         leg,
-        obstacles=bool(waypoints.plan_file.obstacle_keys),
-        pulleys=waypoints.robot_file.pulley_radius is not None,
+        obstacles=bool(plan_file.obstacle_keys),
+        pulleys=robot_file.pulley_radius is not None,
+        motors=robot_file.winch is not None
+        and any(
+            row.of_winch and (getattr(plan_file, row.name) is not None or robot_file.limit(row.name) is not None)
+            for row in LIMITS
+        ),
     )
 
 

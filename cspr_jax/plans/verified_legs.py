@@ -1,4 +1,4 @@
-"""Legs of families that ignore obstacles and pulleys: each motion, once made, is proved with both.
+"""Legs of families that ignore obstacles, pulleys and limits of winches: each motion, once made, is proved with these.
 
 See `verification.verifier`. Where the number of arcs is free, the smallest number with a proof is taken: for point
 masses (over pulleys, only with as many cables as degrees of freedom), and for platforms without pulleys in legs of one
@@ -14,6 +14,7 @@ import numpy as np
 from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
+from cspr_jax.motion.limits import without_motors
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.schema.families import FAMILIES
@@ -22,7 +23,7 @@ from cspr_jax.verification.verifier import Verifier
 
 
 class VerifiedLeg(Leg):
-    """Leg of a family whose motions are proved with obstacles and pulleys; see `Leg`."""
+    """Leg of a family whose motions are proved with obstacles, pulleys and limits of winches; see `Leg`."""
 
     def __init__(self, leg: Leg) -> None:
         """Wrap the leg of a family."""
@@ -31,15 +32,15 @@ class VerifiedLeg(Leg):
 
     def check(self, problem: Problem) -> None:
         """Let the family check the problem; see `Leg.check`."""
-        self._leg.check(_from_points(problem))
+        self._leg.check(_of_family(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
-        """Answers of the family, which ignores obstacles and pulleys; see `Leg.answers`."""
-        return self._leg.answers(_from_points(problem), depths)
+        """Answers of the family, which ignores obstacles, pulleys and winches; see `Leg.answers`."""
+        return self._leg.answers(_of_family(problem), depths)
 
     def warnings(self, problem: Problem) -> list[str]:
         """Warnings of the family; see `Leg.warnings`."""
-        return self._leg.warnings(_from_points(problem))
+        return self._leg.warnings(_of_family(problem))
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
         """Result from the family's answers; see `Leg.result`."""
@@ -47,11 +48,9 @@ class VerifiedLeg(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by proved motions where there are any; see `Leg.join`."""
-        waypoints, plain, prescribed = self.waypoints, _from_points(problem), self.waypoints.arcs
-        verifier = Verifier(
-            problem,
-            scene_of_leg(problem.robot, waypoints),
-        )
+        waypoints, plain, prescribed = self.waypoints, _of_family(problem), self.waypoints.arcs
+        has_scene = bool(waypoints.plan_file.obstacle_keys) or problem.robot.pulleys is not None
+        verifier = Verifier(problem, scene_of_leg(problem.robot, waypoints) if has_scene else None)
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, list[Motion]]:
@@ -70,7 +69,10 @@ class VerifiedLeg(Leg):
         maximum = waypoints.max_arcs if is_searched else 0
         verified = verifier.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
         motions = join(np.arange(len(self)), verified.arcs)[1]
-        return _answers(verified.answers, verified.proofs, has_pulleys=has_pulleys), motions
+        proofs = verified.proofs
+        if not (verifier.parts.usual or verifier.parts.contacts):  # nobody asks for the proofs of limits that are kept
+            proofs = [proof if proof is not None and proof.verdict else None for proof in proofs]
+        return _answers(verified.answers, proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)
@@ -78,16 +80,16 @@ class VerifiedLeg(Leg):
         return leg
 
 
-def verified(leg: Leg, *, obstacles: bool, pulleys: bool) -> Leg:
-    """A leg whose verdicts take obstacles and pulleys into account."""
-    is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (obstacles or pulleys)
+def verified(leg: Leg, *, obstacles: bool, pulleys: bool, motors: bool) -> Leg:
+    """A leg whose verdicts take obstacles, pulleys and limits of winches into account."""
+    is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (obstacles or pulleys or motors)
     return VerifiedLeg(leg) if is_needed else leg
 
 
-def _from_points(problem: Problem) -> Problem:
-    if problem.robot.pulleys is None:
-        return problem
-    return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None))
+def _of_family(problem: Problem) -> Problem:
+    # Without what the family ignores, so that robots with and without winches share compiled functions.
+    robot = dataclasses.replace(problem.robot, pulleys=None, winches=None)
+    return problem._replace(robot=robot, limits=without_motors(problem.limits))
 
 
 def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> Answers:

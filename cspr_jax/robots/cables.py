@@ -23,13 +23,15 @@ from cspr_jax.robots.model.pulleys import pulleys_of
 from cspr_jax.robots.model.robot import MOVED
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.model.tension_rule_table import CENTRED
-from cspr_jax.robots.model.winches import winches_of
+from cspr_jax.robots.model.winches import tensions_within, winch_limits, winches_of
 from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import Distribution
 from cspr_jax.robots.tensions.tension_rules import by_rule
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
+# Limits of winches that bound tensions.
+BOUNDING = {"motor_torque_max", "motor_power_max", "motor_load_max"}
 RobotKind = TypeVar("RobotKind", bound=AnyRobot)
 
 
@@ -49,8 +51,8 @@ def with_cables(
         pulley_radius: () or (n_cables,) radii of the pulleys, m; None: no pulleys.
         pulley_axes: (3,) or (n_cables, 3) swivel axes, in the direction in which the cables enter; None: straight up.
         axial_stiffness: () or (n_cables,) axial stiffness EA of the cables, N; None: they do not stretch.
-        winch: numbers of the winches, one for all or one per cable, by the keys of [winch] in robot files; None: not
-            known.
+        winch: numbers of the winches and their limits, one for all or one per cable, by the keys of [winch] in robot
+            files; None: not known.
 
     Returns:
         the robot.
@@ -78,6 +80,8 @@ def with_cables(
     if winch is not None:
         diameter = robot.cable_diameter if cable_diameter is None else cable_diameter
         changes["winches"] = winches_of(winch, robot.n_cables, diameter, "winch.")
+        own: dict[str, Any] = winch_limits(winch, robot.n_cables, "winch.")
+        changes["limits"] = dataclasses.replace(robot.limits, **own)
     return dataclasses.replace(robot, **changes) if changes else robot
 
 
@@ -98,8 +102,10 @@ def tensions(
 
 
 def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribution:
-    """Tensions of redundant cables, with their residual."""
+    """Tensions of redundant cables, with their residual; within limits of their motors, if there are such."""
     low, high = tension_range(robot, limits)
+    if robot.winches is not None and BOUNDING & {name for name, value in vars(limits).items() if value is not None}:
+        low, high = tensions_within(robot.winches, limits, cable_motion(robot, state), (low, high))
     unit = wrench_units(robot)
     return by_rule(rule, robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit, low, high)
 

@@ -61,6 +61,8 @@ class Limit:
         chart: chart of a motion that shows where it is violated; "": the chart of the path.
         peak: field of `motion.peaks.Peaks` that reports show under the name of the limit; "": none.
         seconds: time that its proof takes in a cell with 30 arcs; `CellCost.limits` of a kind of map multiplies it.
+        of_winch: whether it is a limit of winches, a key of `[winch]` in robot files; the general proof alone knows
+            these, so that families never see them.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Limit:
     chart: str = ""
     peak: str = ""
     seconds: float = 6e-3
+    of_winch: bool = False
 
     @property
     def allowed(self) -> str:
@@ -96,6 +99,8 @@ class Limit:
     @property
     def extreme(self) -> str:
         """Peak of the quantity, in words, for the reference."""
+        if self.of_winch:
+            return f"Robots with winches: {self.description}; null without winches."
         quantity = self.quantity.removeprefix("mass_centre_")
         return f"{SENSES[self.sense]} {quantity} of {'any cable' if self.per_cable else 'the mass centre'}."
 
@@ -117,6 +122,11 @@ def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion:
 def _of_mass_centre(name: str, flag: Verdict, quantity: str, unit: str, **more: Any) -> Limit:
     words, peak = f"largest {quantity} of the mass centre", f"mass_centre_{quantity}"
     return Limit(name, flag, "most", peak, unit, False, True, False, words, peak=peak, **more)
+
+
+def _of_motors(name: str, flag: Verdict, unit: str, words: str, **more: Any) -> Limit:
+    quantity = name.removesuffix("_max")
+    return Limit(name, flag, "most", quantity, unit, True, True, False, words, peak=quantity, of_winch=True, **more)
 
 
 # Rows are in the order of slacks. The floor is a z coordinate in files, and a largest depth in the kernels' axes.
@@ -184,5 +194,50 @@ LIMITS = (
         legend="acceleration",
         colour="#D9B44A",
         chart="acceleration",
+    ),
+    _of_motors(
+        "motor_speed_max",
+        Verdict.MOTOR_TOO_FAST,
+        "rad/s",
+        "largest speed of the motor",
+        legend="motor too fast",
+        colour="#2A9D8F",
+        chart="rate",
+    ),
+    _of_motors(
+        "motor_torque_max",
+        Verdict.MOTOR_OVER_TORQUE,
+        "N m",
+        "largest torque of the motor",
+        legend="motor torque",
+        colour="#E76F51",
+        chart="tension",
+    ),
+    _of_motors(
+        "motor_power_max",
+        Verdict.MOTOR_OVER_POWER,
+        "W",
+        "largest power of the motor, driving or braking",
+        legend="motor power",
+        colour="#8AB17D",
+        chart="tension",
+    ),
+    _of_motors(
+        "motor_load_max",
+        Verdict.MOTOR_OVER_LOAD,
+        "1",
+        "largest torque / motor_stall_torque + speed / motor_no_load_speed (1 where these are given)",
+        legend="motor load",
+        colour="#287271",
+        chart="tension",
+    ),
+    _of_motors(
+        "motor_torque_rms_max",
+        Verdict.MOTOR_OVER_TORQUE_RMS,
+        "N m",
+        "largest root mean square of the motor's torque over the full motion",
+        legend="motor heat",
+        colour="#B56576",
+        chart="tension",
     ),
 )

@@ -38,6 +38,11 @@ class Verdict(enum.IntFlag):
     TOO_FAST = 262144
     OVER_ACCELERATION = 524288
     OVER_FEED = 1048576
+    MOTOR_TOO_FAST = 2097152
+    MOTOR_OVER_TORQUE = 4194304
+    MOTOR_OVER_POWER = 8388608
+    MOTOR_OVER_LOAD = 16777216
+    MOTOR_OVER_TORQUE_RMS = 33554432
 
     @property
     def text(self) -> str:
@@ -73,6 +78,11 @@ SENTENCES = {
     Verdict.TOO_FAST: "The mass centre exceeds its largest speed.",
     Verdict.OVER_ACCELERATION: "The mass centre exceeds its largest acceleration.",
     Verdict.OVER_FEED: "The mass centre exceeds the feed, the F of G-code.",
+    Verdict.MOTOR_TOO_FAST: "A motor exceeds its largest speed.",
+    Verdict.MOTOR_OVER_TORQUE: "A motor exceeds its largest torque.",
+    Verdict.MOTOR_OVER_POWER: "A motor exceeds its largest power, driving or braking.",
+    Verdict.MOTOR_OVER_LOAD: "A motor exceeds its torque-speed line.",
+    Verdict.MOTOR_OVER_TORQUE_RMS: "The root mean square of a motor's torque over the full motion exceeds its limit.",
 }
 
 
@@ -103,6 +113,11 @@ CRITERIA = {
     Verdict.TOO_FAST: CriterionRow("speed_max", "largest speed of the mass centre", "m/s"),
     Verdict.OVER_ACCELERATION: CriterionRow("acceleration_max", "largest acceleration of the mass centre", "m/s^2"),
     Verdict.OVER_FEED: CriterionRow("feed", "feed", "m/s"),
+    Verdict.MOTOR_TOO_FAST: CriterionRow("motor_speed_max", "largest motor speed", "rad/s"),
+    Verdict.MOTOR_OVER_TORQUE: CriterionRow("motor_torque_max", "largest motor torque", "N m"),
+    Verdict.MOTOR_OVER_POWER: CriterionRow("motor_power_max", "largest motor power", "W"),
+    Verdict.MOTOR_OVER_LOAD: CriterionRow("motor_load_max", "largest motor load", "1"),
+    Verdict.MOTOR_OVER_TORQUE_RMS: CriterionRow("motor_torque_rms_max", "rms motor torque", "N m"),
     Verdict.CABLE_CABLE: CriterionRow("cable_distance", "distance between cables", "m"),
     Verdict.CABLE_PLATFORM: CriterionRow("platform_distance", "distance of cables from the platform", "m"),
     Verdict.OBSTACLE: CriterionRow("obstacle_distance", "distance from obstacles", "m"),
@@ -114,7 +129,8 @@ def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> 
     row = CRITERIA.get(flag)
     words = row.words if row is not None else flag.text.replace("_", " ")
     if cable is not None:
-        return f"{words.replace('cable ', '')} of cable {cable + 1}"
+        device = "motor" if "motor" in words else "cable"
+        return f"{words.replace(f'{device} ', '')} of {device} {cable + 1}"
     return f"{words} {feed}".rstrip()
 
 

@@ -38,7 +38,7 @@ def with_attained(
     """
     proofs = np.array(answers.proof)
     for i, motion in enumerate(motions):
-        is_known = proofs[i] is not None and not (proofs[i].contacts_alone and not proofs[i].verdict)
+        is_known = proofs[i] is not None and not (not proofs[i].parts.usual and not proofs[i].verdict)
         if not is_known and not answers.feasible[i]:
             proofs[i] = proof_of(problem, motion, scene)
         if proofs[i] is not None:
@@ -64,7 +64,7 @@ def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
         times = tau[0]
         states = states_as_bounds(motion, times)
         bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
-        return block_slacks(*bounds, contacts_alone=case.contacts_alone).high[None, :, columns]
+        return block_slacks(*bounds, parts=case.parts).high[None, :, columns]
 
     columns = columns[columns < proof.near.slacks.low.shape[1]]  # the last columns are feeds, from another proof
     smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))

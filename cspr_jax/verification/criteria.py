@@ -5,6 +5,9 @@ In natural units (N, m, m/s, m/s^2), with n cables:
     tension     of n = dof cables: n distances of the tensions from their limits; of more: the largest distance that all
                 tensions together can have from their limits
     limits      for each limit that is given: one for each cable, or a single one
+    motors      for each limit of winches: one for each cable; for torque, power and load of n > dof cables, in N, the
+                largest distance that all tensions together can have from the limits between which this limit, those
+                above it and those of tensions keep them
     regular     of a platform on n = dof cables: magnitude of the normalised determinant less what counts as singular
     below       of a point mass or a rigid platform on n = dof cables: depth below the spool plane
     contacts    of all bodies that can meet: clearance of their surfaces, `robots.bounds.contact_bounds`
@@ -13,11 +16,11 @@ In natural units (N, m, m/s, m/s^2), with n cables:
 """
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cspr_jax.motion.limits import allowance, limits_set
+from cspr_jax.motion.limits import allowance, limits_set, motor_limits_set
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
@@ -26,8 +29,10 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.robots.model.winches import largest_radii
 from cspr_jax.robots.statics.wrench_balance import SINGULAR
 from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 
 # Patterns of robots that must stay below their spools.
@@ -40,6 +45,23 @@ FLAGS = {
 }
 # Flags of criteria that can fail at a single time.
 AT_TIMES = (Verdict.SINGULAR, *FLAGS.values())
+
+
+class Parts(NamedTuple):
+    """Criteria that a proof is about, since the family of a motion may have proved the others.
+
+    Fields:
+        usual: tensions, poses, and limits but those of winches.
+        motors: limits of winches.
+        contacts: contacts and the floor.
+    """
+
+    usual: bool = True
+    motors: bool = True
+    contacts: bool = True
+
+
+ALL = Parts()
 
 
 class Criterion(NamedTuple):
@@ -68,34 +90,63 @@ class Criterion(NamedTuple):
         return self.allowed + slack if self.sense == "least" else self.allowed - slack
 
 
-def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
+def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None, parts: Parts = ALL) -> list[Criterion]:
     """Criteria, in the order of their slacks."""
+    rows: list[Criterion] = []
+    if parts.usual:
+        rows += _tension_criteria(robot, limits)
+        for row in limits_set(limits):
+            rows += [] if row.quantity == "tension" else _limit_criteria(robot, limits, row)
+    if parts.motors and robot.winches is not None:
+        for row in motor_limits_set(limits):
+            rows += _motor_criteria(robot, limits, row)
+    if parts.usual:
+        is_regular, is_below = pose_conditions(robot)
+        rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
+        rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
+    return rows + (contact_criteria(robot, limits, scene) if parts.contacts else [])
+
+
+def _tension_criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
     numbers = range(robot.n_cables)
     low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
     if robot.n_cables > robot.dof:
         # A single slack for all tensions together.
-        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N", allowance=TOUCHED * min(low))]
-    else:
-        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k], allowance=TOUCHED * low[k]) for k in numbers]
-        if limits.tension_max is not None:
-            rows += [
-                Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most", allowance=TOUCHED * high[k])
-                for k in numbers
-            ]
-    for row in limits_set(limits):
-        if row.quantity == "tension":
-            continue
-        values = np.atleast_1d(np.asarray(getattr(limits, row.name), float))
-        values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
-        cables = [(k,) if row.per_cable else () for k in range(len(values))]
+        return [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N", allowance=TOUCHED * min(low))]
+    rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k], allowance=TOUCHED * low[k]) for k in numbers]
+    if limits.tension_max is not None:
         rows += [
-            Criterion(row.flag, each, row.unit, None, value, row.sense, float(allowance(row, value, robot)))
-            for each, value in zip(cables, values, strict=True)
+            Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most", allowance=TOUCHED * high[k])
+            for k in numbers
         ]
-    is_regular, is_below = pose_conditions(robot)
-    rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
-    rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
-    return rows + contact_criteria(robot, limits, scene)
+    return rows
+
+
+def _limit_criteria(robot: AnyRobot, limits: Limits, row: Limit) -> list[Criterion]:
+    values = np.atleast_1d(np.asarray(getattr(limits, row.name), float))
+    values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
+    cables = [(k,) if row.per_cable else () for k in range(len(values))]
+    return [
+        Criterion(row.flag, each, row.unit, None, value, row.sense, float(allowance(row, value, robot)))
+        for each, value in zip(cables, values, strict=True)
+    ]
+
+
+def _motor_criteria(robot: AnyRobot, limits: Limits, row: Limit) -> list[Criterion]:
+    if robot.n_cables == robot.dof or not bounds_tensions(row):
+        return _limit_criteria(robot, limits, row)
+    # The tension at standstill by which a limit of torque may be exceeded.
+    winches: Any = robot.winches
+    missed = 0.0
+    if row.quantity == "motor_torque":
+        each = np.asarray(limits.motor_torque_max) * np.asarray(winches.gear_ratio * winches.efficiency)
+        missed = TOUCHED * float(np.min(each / np.asarray(largest_radii(winches))))
+    return [Criterion(row.flag, (), "N", allowance=missed)]
+
+
+def bounds_tensions(row: Limit) -> bool:
+    """Tell whether a limit of winches bounds tensions."""
+    return row.quantity != "motor_speed"
 
 
 def levels(rows: Sequence[Criterion]) -> np.ndarray:

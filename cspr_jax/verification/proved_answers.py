@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from cspr_jax.motion.answers import Answers
@@ -22,7 +23,7 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.verification.criteria import AT_TIMES, Criterion, contact_criteria, criteria, levels
+from cspr_jax.verification.criteria import ALL, AT_TIMES, Criterion, Parts, criteria, levels
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
@@ -42,7 +43,7 @@ class MotionProof(NamedTuple):
         obstacles: names of the obstacles.
         feeds: (pieces,) largest speed of the mass centre on each piece of the motion, m/s, inf without a feed; None:
             there are no feeds.
-        contacts_alone: whether only contacts are proved, since the family of the motion proves the rest.
+        parts: criteria that are proved; the family of the motion proves the others.
     """
 
     criteria: tuple[Criterion, ...]
@@ -50,7 +51,7 @@ class MotionProof(NamedTuple):
     scales: np.ndarray
     obstacles: tuple[str, ...] = ()
     feeds: np.ndarray | None = None
-    contacts_alone: bool = False
+    parts: Parts = ALL
 
     @property
     def is_feasible(self) -> bool:
@@ -183,19 +184,19 @@ def proof_of(
     motion: Any,
     scene: Scene | None = None,
     *,
-    contacts_alone: bool = False,
+    parts: Parts = ALL,
     intervals: bool = True,
 ) -> MotionProof:
     """Proof of one motion; a motion without bounds or duration can only be refuted, by samples."""
     if not hasattr(motion, "bounds") or not np.isfinite(float(motion.duration())):
-        return sampled_proof(problem, motion, scene, contacts_alone=contacts_alone)
+        return sampled_proof(problem, motion, scene, parts=parts)
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
     durations = np.array([float(motion.duration())])
 
     def bounds(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
         return motion.bounds(start, end)
 
-    kind = {"contacts_alone": contacts_alone, "intervals": intervals}
+    kind: Any = {"parts": parts, "intervals": intervals}
     return proofs_of(problem, bounds, durations, scene, jumps, **kind)[0]
 
 
@@ -206,32 +207,52 @@ def proofs_of(
     scene: Scene | None = None,
     jumps: Sequence[np.ndarray] = (),
     *,
-    contacts_alone: bool = False,
+    parts: Parts = ALL,
     intervals: bool = True,
 ) -> list[MotionProof]:
     """Proofs of several motions at once."""
-    rows = _criteria(problem, scene, contacts_alone)
+    rows = _criteria(problem, scene, parts)
 
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
         of_motion = partial(bounds, motion)
-        return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, contacts_alone=contacts_alone)
+        return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, parts=parts)
 
     # Answers name only the nearest contact of each kind, so that others need not be bounded closely.
     names = [(row.flag, () if row.flag in AT_TIMES else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
-    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), intervals=intervals)
-    return [_proof(problem, rows, proof, scene, contacts_alone) for proof in proofs]
+    how: Any = {"intervals": intervals, "margins": parts.usual or parts.contacts}
+    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), **how)
+    return [_proof(problem, rows, proof, scene, parts) for proof in proofs]
 
 
-def _criteria(problem: Problem, scene: Scene | None, contacts_alone: bool) -> tuple[Criterion, ...]:
-    return tuple((contact_criteria if contacts_alone else criteria)(problem.robot, problem.limits, scene))
+def proofs_of_each(
+    problem: Problem, motions: Sequence[Any], scene: Scene | None = None, **how: Any
+) -> list[MotionProof]:
+    """Proofs of motions whose structures may differ; blocks of all motions are bounded together."""
+    durations = np.array([float(motion.duration()) for motion in motions])
+    if not all(hasattr(motion, "bounds") for motion in motions) or not np.isfinite(durations).all():
+        return [proof_of(problem, motion, scene, **how) for motion in motions]
+
+    def bounds(index: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        chosen = np.unique(index).tolist()
+        rows = [np.flatnonzero(index == i) for i in chosen]
+        parts = [motions[i].bounds(start[row], end[row]) for i, row in zip(chosen, rows, strict=True)]
+        order = np.argsort(np.concatenate(rows))
+        return jax.tree.map(lambda *leaves: np.concatenate([np.asarray(leaf) for leaf in leaves])[order], *parts)
+
+    jumps = [motion.jumps() if hasattr(motion, "jumps") else np.empty(0) for motion in motions]
+    return proofs_of(problem, bounds, durations, scene, jumps, **how)
+
+
+def _criteria(problem: Problem, scene: Scene | None, parts: Parts) -> tuple[Criterion, ...]:
+    return tuple(criteria(problem.robot, problem.limits, scene, parts))
 
 
 def _proof(
-    problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None, contacts_alone: bool
+    problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None, parts: Parts
 ) -> MotionProof:
     names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
-    return MotionProof(rows, proof, _scales(problem, rows), names, contacts_alone=contacts_alone)
+    return MotionProof(rows, proof, _scales(problem, rows), names, parts=parts)
 
 
 def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) -> Answers:
@@ -269,7 +290,7 @@ def sampled_proof(
     scene: Scene | None = None,
     samples: int = SAMPLES,
     *,
-    contacts_alone: bool = False,
+    parts: Parts = ALL,
 ) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 
@@ -280,10 +301,8 @@ def sampled_proof(
     if not np.isfinite(duration):
         states, times = at_rest(states), np.where(tau > 0.0, np.nan, 0.0)
     # Blocks of length zero have the slacks at single times.
-    high = block_slacks(
-        problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
-    ).high
-    rows, high = _criteria(problem, scene, contacts_alone), np.where(np.isnan(high), np.inf, high)
+    high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, parts=parts).high
+    rows, high = _criteria(problem, scene, parts), np.where(np.isnan(high), np.inf, high)
     full = np.array([[0.0, times[-1]]])
     proof = TimeProof(
         low=np.full(high.shape[1], -np.inf),
@@ -294,7 +313,7 @@ def sampled_proof(
         blocks=len(tau),
         near=_between(times, high),
     )
-    return _proof(problem, rows, proof, scene, contacts_alone)
+    return _proof(problem, rows, proof, scene, parts)
 
 
 def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:

@@ -74,8 +74,9 @@ def time_proofs(
     *,
     level: np.ndarray | float = 0.0,
     intervals: bool = True,
+    margins: bool = True,
 ) -> list[TimeProof]:
-    """Decide criteria over several full motions at once."""
+    """Decide criteria over several full motions at once; only with `margins` are smallest slacks narrowed down."""
     count = len(durations)
     if not count:
         return []
@@ -97,6 +98,9 @@ def time_proofs(
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
+    if not margins:
+        blocks = joined(leaves)
+        return _proofs(blocks.take(np.lexsort((blocks.start, blocks.motion))), totals, level)
     narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
     return _proofs(narrow.take(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
 

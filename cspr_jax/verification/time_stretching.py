@@ -7,16 +7,21 @@ limits is concave in u, and speeds and accelerations of cables decrease with c: 
 stretching if there is one.
 """
 
+import functools
 import math
+import operator
 from collections.abc import Callable
 from typing import NamedTuple
 
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.proved_answers import TENSIONS, MotionProof
 
 SLOWEST = 1e6  # factor of stretching from which on a motion counts as at rest
 CLOSE = 1e-6  # relative error of the least factor
 # Steps of the search for a feasible u where rest is not feasible, each of which narrows it by the golden section.
 STEPS, GOLDEN = 40, 0.5 * (math.sqrt(5.0) - 1.0)
+# Criteria that a motion may meet though rest fails: torques of motors follow tensions.
+OF_FORCES = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_winch), TENSIONS)
 
 
 class Stretching(NamedTuple):
@@ -68,7 +73,7 @@ def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof
 def _any_feasible(proved: Callable[[float], MotionProof], slowest: MotionProof) -> tuple[float, MotionProof] | None:
     # Criteria other than tensions that fail at rest fail for all u. Else the worst slack has a single maximum over u.
     if any(
-        is_broken and not row.flag & TENSIONS for row, is_broken in zip(slowest.criteria, slowest.broken, strict=True)
+        is_broken and not row.flag & OF_FORCES for row, is_broken in zip(slowest.criteria, slowest.broken, strict=True)
     ):
         return None
     low, high = 0.0, 1.0

@@ -1,7 +1,8 @@
-"""Proofs, with contacts and pulleys, of motions whose families ignore both, and smallest numbers of arcs.
+"""Proofs, with contacts, pulleys and winches, of motions whose families ignore these, and smallest numbers of arcs.
 
-A family makes its motions for cables that leave from points and touch nothing. Among obstacles, or with the shape of a
-platform, only contacts must then be proved, since the family has proved the rest; over pulleys, all criteria must be.
+A family makes its motions for cables that leave from points, touch nothing and are wound by any winch. Among obstacles,
+or with the shape of a platform, only contacts must then be proved, since the family has proved the rest; with limits of
+winches, these; over pulleys, all criteria must be.
 Where numbers of arcs are free, larger ones are tried until the motion is proved.
 """
 
@@ -14,11 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.motion.answers import Answers, replaced
+from cspr_jax.motion.limits import motor_limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
+from cspr_jax.verification.criteria import ALL, Parts
+from cspr_jax.verification.proved_answers import MotionProof, proofs_of, proofs_of_each
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
 
@@ -51,19 +54,25 @@ class Verifier(NamedTuple):
     """Verifier of motions that their family has not proved with contacts and pulleys.
 
     Fields:
-        problem: the problem, whose robot may have pulleys.
-        scene: bodies that can meet, in the robot's axes.
+        problem: the problem, whose robot may have pulleys, and whose limits may be those of winches.
+        scene: bodies that can meet, in the robot's axes; None: the family has proved contacts.
         intervals: whether to find intervals of failure, as in `time_proofs`.
     """
 
     problem: Problem
-    scene: Scene
+    scene: Scene | None
     intervals: bool = True
 
     @property
     def has_pulleys(self) -> bool:
         """Tell whether the robot has pulleys."""
         return self.problem.robot.pulleys is not None
+
+    @property
+    def parts(self) -> Parts:
+        """Criteria that the family has not proved."""
+        motors = bool(motor_limits_set(self.problem.limits))
+        return ALL if self.has_pulleys else Parts(usual=False, motors=motors, contacts=self.scene is not None)
 
     def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> VerifiedSegments:
         """Smallest numbers of arcs whose motions are proved."""
@@ -108,6 +117,9 @@ class Verifier(NamedTuple):
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
         # Verify motions of a family; without pulleys only those that the family has proved.
+        if not any(self.parts):  # the family has proved all but what a plan keeps as a whole
+            proved = np.where(answers.feasible, 0, answers.verdict).astype(FLAGS)
+            return _Trial(answers, [None] * len(proved), proved)
         is_verified = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)
         rows, verdict = np.flatnonzero(is_verified), np.array(answers.verdict, FLAGS)
         proofs: list[MotionProof | None] = [None] * len(verdict)
@@ -120,12 +132,11 @@ class Verifier(NamedTuple):
         return _Trial(answers, proofs, verdict)
 
     def _proofs(self, motions: Any, rows: np.ndarray, intervals: bool) -> list[MotionProof]:
-        how: Any = {"scene": self.scene, "contacts_alone": not self.has_pulleys}
+        how: Any = {"scene": self.scene, "parts": self.parts}
         if not isinstance(motions, list):
             batch = motions.take(rows)
             return proofs_of(self.problem, batch.bounds, batch.durations, intervals=intervals, **how)
-        chosen = [motions[i] for i in rows]
-        return [proof_of(self.problem, motion, intervals=intervals, **how) for motion in chosen]
+        return proofs_of_each(self.problem, [motions[i] for i in rows], intervals=intervals, **how) if len(rows) else []
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
         # Verify contacts of feasible motions for all robots within an uncertainty; the family has verified the rest.

@@ -15,6 +15,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.winches import winch_table
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Errors name this instead of a file if there is no file.
@@ -33,7 +34,10 @@ def robot_table(robot: AnyRobot) -> dict[str, Any]:
             table["platform_points"] = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
     if robot.pulleys is not None:
         table |= {"pulley_radius": robot.pulleys.radius, "pulley_axes": robot.pulleys.axes}
-    table |= {row.name: getattr(robot.limits, row.name) for row in LIMITS if row.per_cable}
+    table |= {row.name: getattr(robot.limits, row.name) for row in LIMITS if row.per_cable and not row.of_winch}
+    table["axial_stiffness"] = robot.axial_stiffness
+    if robot.winches is not None:
+        table["winch"] = winch_table(robot.winches, robot.limits)
     return plain_values(
         {
             key: np.asarray(value) if hasattr(value, "shape") else value

@@ -88,20 +88,21 @@ TensionPerCable: Any = one_or_each(Positive, Bound)
 PerCableDirection: Any = one_or_each(Direction, Direction, _variant_of_vectors)
 
 
-def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
+def _limit_keys(*, of_robots: bool) -> dict[str, Any]:
+    # Keys at the top of robot files, or those that only plans and sweeps have there.
     fields: dict[str, Any] = {}
     for limit in LIMITS:
-        if limit.per_cable == per_cable:
+        if (limit.per_cable and not limit.of_winch) == of_robots:
             kind = Coordinate if limit.is_height else NotNegativePerCable if limit.from_zero else PerCable
-            kind = kind if per_cable or limit.is_height else Positive
+            kind = kind if limit.per_cable or limit.is_height else Positive
             kind = TensionPerCable if limit.name == "tension_max" else kind
-            text = f"{limit.description}{', one number, or one per cable' * per_cable}, {limit.unit}"
+            text = f"{limit.description}{', one number, or one per cable' * limit.per_cable}, {limit.unit}"
             fields[limit.name] = (kind | None, Field(None, description=text))
     return fields
 
 
 # A base class whose fields are the rows of `schema.limits.LIMITS`; Any, since mypy does not know it.
-_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
+_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(of_robots=True))
 
 
 class LimitKeys(_Cables):
@@ -119,7 +120,7 @@ def _uncertainty_keys() -> dict[str, Any]:
 
 
 _Uncertainties: Any = create_model("_Uncertainties", __base__=Table, **_uncertainty_keys())
-_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
+_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(of_robots=False))
 
 
 class UncertaintyTable(_Uncertainties):

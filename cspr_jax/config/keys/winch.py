@@ -1,4 +1,4 @@
-"""Keys of winches in robot files: the rows of `robots.model.winch_numbers`; without jax."""
+"""Keys of winches in robot files: the rows of `robots.model.winch_numbers`, with limits; without jax."""
 
 from typing import Annotated, Any
 
@@ -7,15 +7,16 @@ from pydantic import Field, create_model, model_validator
 from cspr_jax.config.keys.limits import NotNegativePerCable, PerCable, one_or_each
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
-from cspr_jax.robots.model.winch_numbers import TOGETHER, WINCH_NUMBERS
+from cspr_jax.robots.model.winch_numbers import LINE, LOAD, TOGETHER, WINCH_LIMITS, WINCH_NUMBERS
 
 _Sign = Annotated[float, Field(ge=-1, le=1)]
 Signs: Any = one_or_each(_Sign, _Sign)
+ROWS = (*WINCH_NUMBERS, *WINCH_LIMITS)
 
 
 def _keys() -> dict[str, Any]:
     fields: dict[str, Any] = {}
-    for row in WINCH_NUMBERS:
+    for row in ROWS:
         kind = Signs if row.name == "direction" else NotNegativePerCable if row.from_zero else PerCable
         default = "" if row.default is None else f" (default {row.default:g})"
         text = f"{row.description}, one number, or one per cable, {row.unit}{default}"
@@ -25,7 +26,7 @@ def _keys() -> dict[str, Any]:
     return fields
 
 
-# A base class whose fields are the rows of `WINCH_NUMBERS`; Any, since mypy does not know it.
+# A base class whose fields are the rows of `WINCH_NUMBERS` and `WINCH_LIMITS`; Any, since mypy does not know it.
 _Numbers: Any = create_model("_Numbers", __base__=Table, **_keys())
 
 
@@ -34,7 +35,7 @@ class WinchTable(_Numbers):
 
     @model_validator(mode="after")
     def _are_allowed(self) -> "WinchTable":
-        for row in WINCH_NUMBERS:
+        for row in ROWS:
             value = getattr(self, row.name)
             values = value if isinstance(value, list) else [] if value is None else [value]
             if not all(map(row.is_allowed, values)):
@@ -44,14 +45,24 @@ class WinchTable(_Numbers):
             if len(given) == 1:
                 missing = next(name for name in pair if name not in given)
                 raise table_error(missing, None, f"given beside {given[0]}")
+        if getattr(self, LOAD) is not None and getattr(self, LINE) is None:
+            raise table_error(LINE, None, f"given beside {LOAD}")
         return self
 
     def check_count(self, count: int) -> None:
         """Refuse lists that do not have one number per cable."""
-        for row in WINCH_NUMBERS:
+        for row in ROWS:
             value = getattr(self, row.name)
             if isinstance(value, list) and len(value) != count:
                 raise table_error(f"winch.{row.name}", value, f"{row.allowed}, or {count}: one per cable")
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """Limits of the winches; the line is one where the motor has one."""
+        given = {row.name: getattr(self, row.name) for row in WINCH_LIMITS}
+        if given[LOAD] is None and getattr(self, LINE) is not None:
+            given[LOAD] = 1.0
+        return {name: value for name, value in given.items() if value is not None}
 
     @property
     def has_layers(self) -> bool:
@@ -70,5 +81,5 @@ class WinchTable(_Numbers):
         return None
 
     def _lists(self) -> dict[str, list[float]]:
-        lists = {row.name: getattr(self, row.name) for row in WINCH_NUMBERS}
+        lists = {row.name: getattr(self, row.name) for row in ROWS}
         return {name: value for name, value in lists.items() if isinstance(value, list)}

@@ -56,7 +56,7 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
             answers, motions = leg.join(problem, poses.z0)
         except (ConfigError, InputError):
             continue  # the family cannot join these poses
-        is_full = all(proof is not None and not proof.contacts_alone for proof in answers.proof)
+        is_full = all(proof is not None and proof.parts.usual for proof in answers.proof)
         proved = answers if is_full else None
         form = ClosedForm(leg.waypoints.family, motions, answers.feasible, np.asarray(answers.duration), proved)
         if answers.feasible.any() and _passes(form, problem, poses):

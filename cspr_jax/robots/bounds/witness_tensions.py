@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, rotated, squares
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, rotated, rounded, squares
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import FLAT
@@ -58,9 +58,17 @@ class WitnessTensions(NamedTuple):
 
 
 def witness_tensions(
-    matrix: AffineBounds, wrench: AffineBounds, low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
+    matrix: AffineBounds,
+    wrench: AffineBounds,
+    low: Float[Array, "*2 n_cables"],
+    high: Float[Array, "*2 n_cables"],
+    outer: tuple[Float[Array, "2 n_cables"], Float[Array, "2 n_cables"]] | None = None,
 ) -> WitnessTensions:
-    """Tensions that balance a motion throughout a block."""
+    """Tensions that balance a motion throughout a block.
+
+    Limits of redundant cables may depend on time: then `low` and `high` are values at both ends of the block of lines
+    not outside of these limits, and `outer` those of lines not inside.
+    """
     dof, count = matrix.middle.shape
     inverse = right_inverse(matrix.middle)
     if count == dof:
@@ -71,21 +79,24 @@ def witness_tensions(
         matrices, wrenches = (
             jnp.stack([x.middle + squares(x) - x.linear, x.middle + squares(x) + x.linear]) for x in (matrix, wrench)
         )
-        faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
+        lows, highs = (jnp.broadcast_to(side, (2, count)) for side in (low, high))
+        faces = jax.vmap(nearest_face)(matrices, wrenches, lows, highs)
         before, after = faces.tensions
-        nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
+        nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - lows, highs - faces.tensions), axis=1))
         face = jax.tree.map(lambda array: array[nearer], faces)
         back = inverse if matrix.square is None else _central_inverse(matrix.middle, face, inverse)
         tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
-        above = _face_margin(matrix, inverse, wrench, (low, high), face)
+        above = _face_margin(matrix, inverse, wrench, outer or (lows, highs), face)
+        low, high = jnp.max(lows, axis=0), jnp.min(highs, axis=0)
     if tension.square is not None:
         minimum = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
         below = jnp.broadcast_to(jnp.where(is_regular, minimum, -jnp.inf), (2,))
         return WitnessTensions(tension, below, above, is_regular, inverse)
     # The minimum of several lines is a concave function, above the line between its values at both ends.
-    lines = tension.middle - tension.linear, tension.middle + tension.linear
-    slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
-    below = jnp.stack([jnp.min(slack) for slack in slacks])
+    if count == dof:
+        lows, highs = (jnp.broadcast_to(side, (2, count)) for side in (low, high))
+    lines = jnp.stack([tension.middle - tension.linear, tension.middle + tension.linear])
+    below = jnp.min(jnp.minimum(lines - lows, highs - lines) - tension.radius[None], axis=1)
     return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
 
 
@@ -142,16 +153,21 @@ def _face_margin(
     along = rotated(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Take each cable at the limit with the smaller product; the other limit counts if the product may change its sign.
     is_inward = along.middle > 0.0
-    limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))
-    is_bounded = jnp.isfinite(limit) | (along.magnitude() == 0.0)
+    ends = jnp.where(is_spanning[None], 0.0, jnp.where(is_inward[None], low, high))
+    is_bounded = jnp.isfinite(ends).all(0) | (along.magnitude() == 0.0)
+    ends = jnp.where(is_bounded[None], ends, 0.0)
+    limit = rounded(AffineBounds(0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]), jnp.zeros(count)))
     over = jnp.where(is_inward, -along.low(), along.high())
-    other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
-    slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
+    span = jnp.maximum(jnp.max(high - low, axis=0), 0.0)
+    other = jnp.where(over > FLAT * jnp.abs(along.middle), over * span, 0.0)
+    slack = dot(normal, wrench) - dot(along, limit)
     top = slack.middle + slack.radius + jnp.maximum(squares(slack), 0.0) + jnp.sum(other)
     ends = jnp.stack([top - slack.linear, top + slack.linear])
     # The quotient is a convex function of the slack: it is below the line between its values at both ends.
     smallest = jnp.maximum(along.magnitude() - 2.0 * along.half_range(), 0.0)
     norm = jnp.where(ends < 0.0, jnp.sum(along.magnitude()), jnp.sum(smallest))
     is_bound = is_normal & is_bounded.all() & (norm > 0.0).all() & jnp.isfinite(ends).all()
-    above, half = jnp.where(is_bound, ends / jnp.where(is_bound, norm, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
-    return jnp.where(jnp.max(above) < half, above, half)
+    above = jnp.where(is_bound, ends / jnp.where(is_bound, norm, 1.0), jnp.inf)
+    halves = 0.5 * (high - low)
+    half = halves[:, jnp.argmin(jnp.max(halves, axis=0))]
+    return jnp.where(jnp.max(above) < jnp.max(half), above, half)

@@ -40,6 +40,11 @@ class Limits:
         cable_acceleration_max: (n_cables,) largest accelerations of either sign, m/s^2.
         speed_max: () largest speed of the mass centre, m/s.
         acceleration_max: () largest acceleration of the mass centre, m/s^2.
+        motor_speed_max: (n_cables,) largest speeds of the motors, rad/s.
+        motor_torque_max: (n_cables,) largest torques of the motors, N m.
+        motor_power_max: (n_cables,) largest powers of the motors, driving or braking, W.
+        motor_load_max: (n_cables,) largest sums of torque over stall torque and speed over no-load speed.
+        motor_torque_rms_max: (n_cables,) largest root mean squares of torques over the full motion, N m.
         uncertainty: uncertainty within which every robot must meet the limits with taut cables.
     """
 
@@ -51,6 +56,11 @@ class Limits:
     cable_acceleration_max: Array | None = None
     speed_max: Array | None = None
     acceleration_max: Array | None = None
+    motor_speed_max: Array | None = None
+    motor_torque_max: Array | None = None
+    motor_power_max: Array | None = None
+    motor_load_max: Array | None = None
+    motor_torque_rms_max: Array | None = None
     uncertainty: Uncertainty | None = None
 
 

@@ -2,6 +2,8 @@
 
 import dataclasses
 
+from cspr_jax.schema.limits import LIMITS
+
 
 @dataclasses.dataclass(frozen=True)
 class WinchNumber:
@@ -69,3 +71,7 @@ WINCH_NUMBERS = (
 )
 # Numbers that are given together, or not at all.
 TOGETHER = (("layer_turns", "cable_length"), ("motor_stall_torque", "motor_no_load_speed"))
+# Limits of winches, whose rows are in `schema.limits`; keys of `[winch]` too.
+WINCH_LIMITS = tuple(WinchNumber(row.name, row.unit, row.description) for row in LIMITS if row.of_winch)
+# Line, and the limit that it sets to 1 where no other value is given.
+LINE, LOAD = TOGETHER[1][0], "motor_load_max"

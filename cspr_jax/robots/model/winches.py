@@ -29,7 +29,8 @@ from cspr_jax.errors.given_numbers import numbers
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
-from cspr_jax.robots.model.winch_numbers import TOGETHER, WINCH_NUMBERS, WinchNumber
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.winch_numbers import LINE, LOAD, TOGETHER, WINCH_LIMITS, WINCH_NUMBERS, WinchNumber
 
 # A motor whose speed is below this one, in rad/s, stands still: friction may act in either direction.
 STANDSTILL = 1e-6
@@ -87,7 +88,7 @@ class Winches:
 
 def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at: str = "") -> Winches:
     """Winches of a robot, from the numbers of `robots.model.winch_numbers`, checked."""
-    names = [row.name for row in WINCH_NUMBERS]
+    names = [row.name for row in (*WINCH_NUMBERS, *WINCH_LIMITS)]
     for name in values:
         if name not in names:
             raise InputError(
@@ -109,6 +110,26 @@ def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at
         layers = Layers(growth, turns, length)
     line: dict[str, Any] = {name: given.pop(f"motor_{name}", None) for name in ("stall_torque", "no_load_speed")}
     return Winches(**given, **line, layers=layers)
+
+
+def winch_limits(values: Mapping[str, Any], n_cables: int, at: str = "") -> dict[str, Array]:
+    """Limits of winches among their numbers, checked; the load is at most 1 where the motor has a line."""
+    given = {row.name: value for row in WINCH_LIMITS if (value := _number(row, values, n_cables, at)) is not None}
+    if values.get(LINE) is not None:
+        return {LOAD: as_float64(np.ones(n_cables))} | given
+    if LOAD in given:
+        raise InputError(f"{at}{LINE}", None, f"given beside {LOAD}", problem="missing")
+    return given
+
+
+def winch_table(winches: Winches, limits: Limits) -> dict[str, Any]:
+    """Keys of `[winch]` of a robot: the inverse of `winches_of` and `winch_limits`."""
+    numbers = {row.name: getattr(winches, row.name.removeprefix("motor_"), None) for row in WINCH_NUMBERS}
+    numbers["motor_inertia"] = winches.motor_inertia
+    if winches.layers is not None:
+        numbers |= {"layer_turns": winches.layers.turns, "cable_length": winches.layers.cable_length}
+    numbers |= {row.name: getattr(limits, row.name) for row in WINCH_LIMITS}
+    return {name: np.asarray(value) for name, value in numbers.items() if value is not None}
 
 
 def _number(row: WinchNumber, values: Mapping[str, Any], n_cables: int, at: str) -> Array | None:
@@ -148,6 +169,11 @@ def radii(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
     if winches.layers is None:
         return jnp.broadcast_to(winches.drum_radius, lengths.shape)
     return winches.drum_radius + winches.layers.growth * _full_layers(winches, winches.layers, lengths)
+
+
+def largest_radii(winches: Winches) -> Float[Array, "n"]:
+    """Radii of the drums with all of the cable on them."""
+    return radii(winches, jnp.zeros_like(winches.drum_radius))
 
 
 def drum_angles(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
@@ -203,12 +229,73 @@ def motor_states(
     tensions: Float[Array, "n"],
 ) -> MotorStates:
     """States of the motors that give cables these lengths, rates, accelerations and tensions."""
-    radius = radii(winches, lengths)
-    speed, acceleration = (-winches.gear_ratio * each / radius for each in (rates, accelerations))
+    radius, speed, acceleration = wound(winches, (lengths, rates, accelerations))
     side = jnp.where(jnp.abs(speed) <= STANDSTILL, 0.0, jnp.sign(speed))
     torque = torques(winches, radius, speed, acceleration, tensions, side)
     sign = -winches.direction
     return MotorStates(motor_angles(winches, lengths), sign * speed, sign * acceleration, sign * torque, torque * speed)
+
+
+class MotorDemands(NamedTuple):
+    """What motions ask of the motors, (n_cables,) magnitudes each; at standstill of the worse direction of friction.
+
+    Fields:
+        motor_speed: rad/s.
+        motor_torque: N m.
+        motor_power: W.
+        motor_load: torque over stall torque plus speed over no-load speed; 0 without such a line.
+    """
+
+    motor_speed: Array
+    motor_torque: Array
+    motor_power: Array
+    motor_load: Array
+
+
+def motor_demands(winches: Winches, motion: tuple[Array, Array, Array], tensions: Float[Array, "n"]) -> MotorDemands:
+    """Demands of cables with these lengths, rates, accelerations and tensions."""
+    radius, speed, acceleration = wound(winches, motion)
+
+    def torque(side: float) -> Array:
+        return jnp.abs(torques(winches, radius, speed, acceleration, tensions, jnp.full_like(speed, side)))
+
+    largest = jnp.maximum(
+        jnp.where(speed >= -STANDSTILL, torque(1.0), 0.0), jnp.where(speed <= STANDSTILL, torque(-1.0), 0.0)
+    )
+    load = jnp.zeros_like(speed)
+    if winches.stall_torque is not None and winches.no_load_speed is not None:
+        load = largest / winches.stall_torque + jnp.abs(speed) / winches.no_load_speed
+    return MotorDemands(jnp.abs(speed), largest, largest * jnp.abs(speed), load)
+
+
+def wound(winches: Winches, motion: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """Radii of the drums, and winding speeds and accelerations of the motors, from lengths and two derivatives."""
+    length, rate, second_derivative = motion
+    radius = radii(winches, length)
+    gain = -winches.gear_ratio / radius
+    return radius, gain * rate, gain * second_derivative
+
+
+def tensions_within(
+    winches: Winches, limits: Limits, motion: tuple[Array, Array, Array], allowed: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Smallest and largest tensions among those allowed with which motors keep their torque, power and load."""
+    radius, speed, acceleration = wound(winches, motion)
+    low, high = allowed
+    largest = [limits.motor_torque_max] if limits.motor_torque_max is not None else []
+    if limits.motor_power_max is not None:
+        largest.append(limits.motor_power_max / jnp.maximum(jnp.abs(speed), STANDSTILL))
+    if limits.motor_load_max is not None:
+        left = limits.motor_load_max - jnp.abs(speed) / jnp.asarray(winches.no_load_speed)
+        largest.append(left * jnp.asarray(winches.stall_torque))
+    for side in (1.0, -1.0):
+        sides, occurs = jnp.full_like(speed, side), side * speed >= -STANDSTILL
+        own = torques(winches, radius, speed, acceleration, jnp.zeros_like(speed), sides)
+        gain = winches.gear_ratio * winches.efficiency**sides / radius
+        for torque in largest:
+            low = jnp.where(occurs, jnp.maximum(low, (-torque - own) * gain), low)
+            high = jnp.where(occurs, jnp.minimum(high, (torque - own) * gain), high)
+    return low, high
 
 
 def _wound(winches: Winches, layers: Layers, full: Any) -> Any:

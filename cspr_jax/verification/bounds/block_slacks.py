@@ -8,32 +8,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.limits import limits_set, motor_limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
 from cspr_jax.numerics.bounds.function_bounds import changes_sign, determinant, magnitude_range
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
+from cspr_jax.robots.bounds.motor_bounds import motor_bounds, motor_slack, part_of, tension_lines
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
-from cspr_jax.robots.bounds.witness_tensions import witness_tensions
+from cspr_jax.robots.bounds.witness_tensions import WitnessTensions, witness_tensions
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import Bodies, bodies_of, default_scene, platform_corners
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.model.winches import Winches
 from cspr_jax.robots.statics.wrench_balance import SINGULAR
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.criteria import AT_TIMES, contact_criteria, criteria, pose_conditions
+from cspr_jax.verification.criteria import ALL, AT_TIMES, Parts, bounds_tensions, criteria, pose_conditions
 
 # Numbers of blocks that are bounded together, with contacts and without.
 BATCH = 64
@@ -85,29 +87,28 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-@persistent_jit(static_argnames=("passes", "contacts_alone"))
+@persistent_jit(static_argnames=("passes", "kinds"))
 def _kernel(
     robot: AnyRobot,
     limits: Limits,
     bodies: Bodies,
     states: StateBounds,
     passes: bool = False,
-    contacts_alone: bool = False,
+    kinds: Parts = ALL,
 ) -> tuple[Array, ...] | Array:
     # Bound the slacks, or tell which of them are proved to vanish at a single time.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
         cables, matrix, wrench = _balance(robot, state)
         if passes:
             return _passes(robot, bodies, matrix, state, cables)
-        parts: list[Part] = []
-        if not contacts_alone:
-            parts += [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
-            parts += _of_pose(robot, matrix, state)
-        parts.append(contact_bounds(robot, bodies, state, cables))
-        corners = platform_corners(robot, bodies)
-        if limits.floor is not None and corners is not None:
-            heights = -corner_depths(corners, state) + limits.floor
-            parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
+        parts = _of_rates(robot, limits, state, (cables, matrix, wrench), kinds)
+        parts += _of_pose(robot, matrix, state) if kinds.usual else []
+        if kinds.contacts:
+            parts.append(contact_bounds(robot, bodies, state, cables))
+            corners = platform_corners(robot, bodies)
+            if limits.floor is not None and corners is not None:
+                heights = -corner_depths(corners, state) + limits.floor
+                parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
         return _joined(parts)
 
     return jax.vmap(one)(states)
@@ -136,23 +137,64 @@ def _speeds_kernel(velocity: AffineBounds) -> Part:
 def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
     # Bound the smallest slacks: the lower end of a line above a slack is an upper bound of its smallest value.
     def one(state: StateBounds) -> tuple[Array, Array]:
-        cables, matrix, wrench = _balance(robot, state)
-        parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
+        parts = _of_rates(robot, limits, state, _balance(robot, state), ALL)
         low, high, _, rise = _joined(parts)
         return low, high - jnp.abs(rise)
 
     return jax.vmap(one)(states)
 
 
+def _of_rates(
+    robot: AnyRobot,
+    limits: Limits,
+    state: StateBounds,
+    balance: tuple[CableBounds, AffineBounds, AffineBounds],
+    kinds: Parts,
+) -> list[Part]:
+    # Bound the slacks of tensions and limits, those of winches last.
+    parts, (cables, matrix, wrench) = list[Part](), balance
+    tensions = witness_tensions(matrix, wrench, *tension_range(robot, limits))
+    if kinds.usual:
+        parts += [*_of_tensions(robot, limits, tensions), *limit_slacks(limits, state, cables)]
+    if kinds.motors and robot.winches is not None and motor_limits_set(limits):
+        parts += _of_motors(robot, limits, balance, tensions)
+    return parts
+
+
 def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
     """Bounds of the slacks of tensions over one block."""
+    return _of_tensions(robot, limits, witness_tensions(matrix, wrench, *tension_range(robot, limits)))
+
+
+def _of_tensions(robot: AnyRobot, limits: Limits, tensions: WitnessTensions) -> list[Part]:
     low, high = tension_range(robot, limits)
-    tensions = witness_tensions(matrix, wrench, low, high)
     if robot.n_cables > robot.dof:
         return [_lines(tensions.below[:, None], tensions.above[:, None])]
     slacks = [tensions.tension - low]
     slacks += [] if limits.tension_max is None else [high - tensions.tension]
     return [_part(slack) for slack in slacks]
+
+
+def _of_motors(
+    robot: AnyRobot,
+    limits: Limits,
+    balance: tuple[CableBounds, AffineBounds, AffineBounds],
+    tensions: WitnessTensions,
+) -> list[Part]:
+    # Bound the slacks of limits of winches, of redundant cables by tensions in ranges that narrow limit by limit.
+    (cables, matrix, wrench), winches = balance, cast("Winches", robot.winches)
+    parts, motors = list[Part](), motor_bounds(winches, cables)
+    allowed = tension_lines(*map(jnp.asarray, tension_range(robot, limits)))
+    for row in motor_limits_set(limits):
+        limit = jnp.asarray(getattr(limits, row.name))
+        if robot.n_cables == robot.dof or not bounds_tensions(row):
+            parts.append(part_of(motor_slack(winches, row, limit, motors, tensions.tension)))
+            continue
+        allowed = allowed.narrowed(winches, row, limit, motors)
+        outer = allowed.low.below, allowed.high.above
+        narrow = witness_tensions(matrix, wrench, allowed.low.above, allowed.high.below, outer)
+        parts.append(_lines(narrow.below[:, None], narrow.above[:, None]))
+    return parts
 
 
 def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[Part]:
@@ -210,14 +252,13 @@ def block_slacks(
     start: Float[np.ndarray, "k"],
     end: Float[np.ndarray, "k"],
     scene: Scene | None = None,
-    *,
-    contacts_alone: bool = False,
+    parts: Parts = ALL,
 ) -> BlockSlacks:
     """Bounds of the slacks of a motion over blocks of time."""
     bodies = bodies_of(robot, scene or default_scene(robot))
-    slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
+    slacks = partial(_kernel, robot, limits, bodies, kinds=parts)
     low, high, *rises = in_batches(slacks, bounds(start, end), batch_size=BATCH)
-    rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
+    rows = criteria(robot, limits, scene, parts)
     at_times = np.array([row.flag in AT_TIMES for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_times]
     # Extend blocks to earlier times, so that an event at the border of two blocks lies within an extended block.
@@ -229,6 +270,7 @@ def block_slacks(
         states = jax.tree.map(lambda array: np.asarray(array)[short], bounds(before, end))
         passes = in_batches(kernel, states, batch_size=BATCH)
         passes = passes if rows[np.argmax(at_times)].flag == Verdict.SINGULAR else passes[:, 1:]
+        passes = passes if parts.contacts else passes[:, :1]
         vanishing = np.zeros((len(short), len(rows)), bool)
         vanishing[:, at_times] = passes & is_open[short]
         high[short] = np.where(vanishing, -SMALLEST, high[short])

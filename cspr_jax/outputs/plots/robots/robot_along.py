@@ -80,7 +80,7 @@ def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") 
     limits = []
     for row in LIMITS:
         limit_of_plan = getattr(plan, row.name, None)
-        limit = getattr(robot_file, row.name, None) if limit_of_plan is None else limit_of_plan
+        limit = robot_file.limit(row.name) if limit_of_plan is None else limit_of_plan
         if row.quantity != quantity or limit is None:
             continue
         values = np.unique(np.atleast_1d(np.asarray(limit, float)))

@@ -1,0 +1,169 @@
+"""Limits of winches, proved for random motions beside dense samples of an oracle apart, on both sides of each limit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motions.test_any_motion import robot_of
+from oracles import winches
+from oracles.any_motion_cases import KINDS, random_case
+from oracles.winch_cases import LIMITS, random_limit, random_winch
+
+import cspr_jax
+from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.verification.attained import attained
+from cspr_jax.verification.criteria import Parts
+from cspr_jax.verification.proved_answers import proof_of
+
+MOTORS = Parts(usual=False, motors=True, contacts=False)
+BESIDE = 1e-3
+# Samples of the oracle, fewer where each is a linear program.
+DENSE = {"samples": 4001}
+SPARSE = {"samples": 161, "rounds": 3, "parts": 6}
+FLAGS = {
+    "motor_speed_max": "motor_too_fast",
+    "motor_torque_max": "motor_over_torque",
+    "motor_power_max": "motor_over_power",
+    "motor_load_max": "motor_over_load",
+}
+
+
+def _motion(case, frame):
+    samples, rotated = case.samples, case.samples.get("quaternions")
+    if rotated is not None:
+        rotated = rotated * np.concatenate([[1.0], frame.signs])
+    rates, given_rates = samples.get("rates"), {}
+    if rates is not None:
+        names = ("velocities", "accelerations")[: rates.shape[1]]
+        given_rates = {name: rates[:, i] * frame.signs for i, name in enumerate(names)}
+    how = {"interpolation": samples["interpolation"], "ends": samples["ends"]}
+    return interpolated(samples["times"], frame.inward(samples["positions"]), rotated, **given_rates, **how)
+
+
+def _machine(seed, kind, *, pulleys=False, layers=False):
+    rng = np.random.default_rng(seed)
+    case = random_case(rng, pulleys, kind)
+    winch, diameter = random_winch(rng, case, layers)
+    robot, frame = centred(cspr_jax.with_cables(robot_of(case), cable_diameter=diameter, winch=winch))
+    return rng, case, winch | {"growth": diameter}, robot, _motion(case, frame)
+
+
+def compare(seed, kind, names=LIMITS, **how):
+    """Compare verdicts with the oracle at limits just above and below what a motion needs; the number of verdicts."""
+    rng, case, winch, robot, motion = _machine(seed, kind, **how)
+    count, is_redundant = robot.n_cables, robot.n_cables > robot.dof
+    weight = case.robot["mass"] * case.robot["gravity"]
+    within = {"tension_min": np.zeros(count), "tension_max": np.full(count, 50.0 * weight)} if is_redundant else {}
+    compared = 0
+    for name in names:
+        limit = random_limit(rng, winch, name)
+        motors = winches.Motors(case.robot, winch, within | {name: limit}, case.motion)
+        need, _ = winches.largest_need(motors, name, **(SPARSE if is_redundant and "speed" not in name else DENSE))
+        if not np.isfinite(need):  # a motion that these tensions cannot give, or too near a singular pose
+            continue
+        for factor in (1.0 + BESIDE, 1.0 - BESIDE):
+            limits = Limits(**within, **{name: limit * need * factor})
+            proof = proof_of(Problem(robot, limits, None), motion, parts=MOTORS)  # type: ignore[arg-type]
+            expected = "feasible" if factor > 1.0 else FLAGS[name]
+            assert proof.verdict.text == expected, (seed, kind, name, factor, need)
+            compared += 1
+            if factor < 1.0 and not is_redundant:
+                reached = attained(Problem(robot, limits, None), motion, proof)  # type: ignore[arg-type]
+                _check_cause(reached, motors, name, need, factor, start=float(case.samples["times"][0]))
+    return compared
+
+
+def _check_cause(proof, motors, name, need, factor, start):
+    """The worst motor is one that needs most, and the failing intervals hold times at which it fails."""
+    times = np.array([time for intervals in proof.proof.failing for time in intervals.mean(1)]) + start
+    # At the ends of a motion, and where a winch turns back, both sides of friction count.
+    assert (motors.needs(name, times) > need * factor * (1.0 - 1e-9)).all()
+    worst = int(np.argmin(proof.proof.high / proof.scales))
+    row = proof.criteria[worst]
+    assert row.value(float(proof.proof.high[worst])) / row.allowed == pytest.approx(1.0 / factor, rel=1e-4)
+
+
+def test_spatial_point_mass():
+    assert compare(1, "3T-3", layers=True) == 8
+
+
+def test_redundant_planar_point_mass():
+    assert compare(4, "2T-3", names=("motor_torque_max", "motor_power_max")) == 4
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("layers", [False, True])
+def test_all_kinds(kind, layers):
+    assert sum(compare(seed, kind, layers=layers) for seed in range(2)) > 0
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", ["3T-3", "3R3T-6", "3T-4"])
+def test_pulleys(kind):
+    assert sum(compare(seed, kind, pulleys=True) for seed in range(4)) > 0
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 2**32), layers=st.booleans(), pulleys=st.booleans())
+def test_any_seed(kind, seed, layers, pulleys):
+    compare(seed, kind, layers=layers, pulleys=pulleys)
+
+
+def test_touched_limits_are_kept():
+    rng, case, winch, robot, motion = _machine(1, "3T-3")
+    for name in LIMITS:
+        limit = random_limit(rng, winch, name)
+        need, _ = winches.largest_need(winches.Motors(case.robot, winch, {name: limit}, case.motion), name)
+        for factor, expected in ((1.0, "feasible"), (1.0 - 1e-6, FLAGS[name])):
+            problem = Problem(robot, Limits(**{name: limit * need * factor}), None)  # type: ignore[arg-type]
+            assert proof_of(problem, motion, parts=MOTORS).verdict.text == expected
+
+
+WINCH = {"drum_radius": 0.02, "gear_ratio": 3.0, "friction": 0.005, "efficiency": 0.9, "motor_inertia": 1e-5}
+PLAN = {
+    "schema": 1,
+    "family": "spline",
+    "pose": [
+        {"position": [0.0, 0.0, 1.4], "time": 0.0},
+        {"position": [0.1, 0.05, 1.3], "time": 1.0},
+        {"position": [0.0, 0.0, 1.4], "time": 2.5},
+    ],
+}
+SPOOLS = [[0.23, -0.13, 0.0], [-0.23, -0.13, 0.0], [0.0, 0.26, 0.0]]
+
+
+def _plan(winch=None, **more):
+    robot = {"name": "test", "base_points": SPOOLS, "mass": 0.2} | ({} if winch is None else {"winch": winch})
+    return PLAN | {"robot": robot} | more
+
+
+@pytest.mark.parametrize(
+    ("winch", "more", "words"),
+    [
+        (None, {"limits": {"motor_speed_max": 3.0}}, "the robot has no winches"),
+        (WINCH, {"limits": {"motor_load_max": 1.0}}, "no motor_stall_torque"),
+        (WINCH, {"limits": {"motor_torque_max": [1.0, 2.0]}}, "3: one a cable"),
+        (WINCH, {"limits": {"motor_torque_max": 1.0, "uncertainty": {"mass_factor": 1.1}}}, "a limit of winches"),
+        (WINCH | {"motor_load_max": 1.0}, {}, "motor_stall_torque"),
+        (WINCH | {"motor_power_max": -1.0}, {}, "motor_power_max"),
+    ],
+)
+def test_wrong_limits_are_refused_in_one_line(winch, more, words):
+    with pytest.raises(cspr_jax.errors.ConfigError) as caught:
+        cspr_jax.plan(_plan(winch, **more))
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_functions_without_such_a_proof_refuse_them():
+    robot = cspr_jax.with_cables(cspr_jax.point_mass(SPOOLS, mass=0.2), winch=WINCH | {"motor_speed_max": 3.0})
+    with pytest.raises(cspr_jax.errors.InputError, match="does not exist yet for limits of winches"):
+        cspr_jax.minimum_arcs(robot, [[0.1, 0.1, 1.4]], z0=1.4)
+    assert dataclasses.asdict(robot.limits)["motor_speed_max"].tolist() == [3.0] * 3
