@@ -21,6 +21,7 @@ from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Cables, ManyTimes, PointsOfMany, QuaternionsOfMany, VectorsOfMany
 from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.columns import Columns
@@ -117,9 +118,7 @@ def check_many(  # noqa: PLR0913
                 raise InputError(
                     f"motion {i}, {error.key}", error.value, error.allowed, problem=error.problem
                 ) from error
-        if problem.limits.motor_torque_rms_max is not None:
-            limit = np.asarray(problem.limits.motor_torque_rms_max).tolist()
-            raise InputError("limits.motor_torque_rms_max", limit, "absent for many motions (check does one)")
+        check_no_means(problem.limits, "limits.")
         batch, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
         proofs = proofs_of(problem, batch.bounds, batch.durations, scene, batch.jumps)
         answers = with_attained(problem, answers_of(proofs, batch.durations), motions, scene)

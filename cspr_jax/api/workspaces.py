@@ -25,7 +25,7 @@ from cspr_jax.errors.arguments import (
 )
 from cspr_jax.errors.given_numbers import numbers
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.motion.given_limits import limits_over, static_limits
 from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame
@@ -128,7 +128,8 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be given for each cable
         allowed = f"a number > 0, or {robot.n_cables}: one a cable"
         tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
-    return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
+    given = Limits(tension_min=tension_min, tension_max=tension_max)
+    return static_limits(robot, limits_over(robot, given, any_tensions=True, motors=True))
 
 
 def kernel_poses(
@@ -335,7 +336,7 @@ def available_accelerations(
     check_in_plane("positions", points, is_planar=robot.dof == PLANAR)
     with double_precision():
         tensions: dict[str, Any] = {"tension_min": tension_min, "tension_max": tension_max}
-        limits = limits_over(robot, Limits(**tensions))
+        limits = static_limits(robot, limits_over(robot, Limits(**tensions), motors=True))
         prepared_robot, frame = prepared(robot)
         allowed = touchable_limits(prepared_robot, limits)
         faces, wider = (faces_of(prepared_robot, each, frame.inward(points)) for each in (limits, allowed))

@@ -13,7 +13,7 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motion.given_limits import check_no_motors
+from cspr_jax.motion.given_limits import check_no_means, check_no_motors
 from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.shapes import Bool, Float
@@ -61,11 +61,10 @@ class GridMap(abc.ABC):
             for_bounds=for_bounds,
             any_cables=self.any_cables,
         )
-        if not self.motors:
-            try:
-                check_no_motors(self._problem.limits)
-            except InputError as error:
-                raise ConfigError(file, str(error)) from error
+        try:
+            (check_no_means if self.motors else check_no_motors)(self._problem.limits)
+        except InputError as error:
+            raise ConfigError(file, str(error)) from error
 
     def _scene_or_none(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None without obstacles and without a shape of the platform.

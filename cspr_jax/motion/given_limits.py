@@ -9,6 +9,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.given_numbers import SMALLEST, numbers
+from cspr_jax.motion.limits import without_motors
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits, Uncertainty
@@ -100,6 +101,35 @@ def check_no_motors(limits: Limits, at: str = "") -> None:
         if row.of_winch and value is not None:
             why = "absent (what is asked for does not exist yet for limits of winches: plans, checks and some maps do)"
             raise InputError(f"{at}{row.name}", np.unique(np.asarray(value)).tolist(), why)
+
+
+def check_no_means(limits: Limits, at: str = "") -> None:
+    """Refuse limits of full motions where single motions are parts of no plan."""
+    if limits.motor_torque_rms_max is not None:
+        value = np.unique(np.asarray(limits.motor_torque_rms_max)).tolist()
+        raise InputError(f"{at}motor_torque_rms_max", value, "absent: only plans and checks of one motion take it")
+
+
+def static_limits(robot: Any, limits: Limits) -> Limits:
+    """Limits of poses at rest, where limits of torque, in the worse direction of friction, are limits of tensions."""
+    largest = {"motor_torque_max": limits.motor_torque_max, "motor_torque_rms_max": limits.motor_torque_rms_max}
+    if limits.motor_load_max is not None:
+        largest["motor_load_max"] = limits.motor_load_max * robot.winches.stall_torque
+    given = {name: np.asarray(torque) for name, torque in largest.items() if torque is not None}
+    high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)
+    low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
+    for name, torque in given.items():
+        if robot.winches.layers is not None:
+            allowed = "absent at rest on drums with layers, whose torques depend on lengths"
+            raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
+        winches = robot.winches
+        arm = np.asarray(winches.drum_radius / (winches.gear_ratio * winches.efficiency))
+        high = np.minimum(high, (torque - np.asarray(winches.friction)) / arm)
+        if not (high > low).all():
+            allowed = "enough for the friction of each winch and for its cable's smallest tension"
+            raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
+    limits = without_motors(limits)
+    return dataclasses.replace(limits, tension_max=as_float64(high)) if given else limits
 
 
 def check_motors(robot: PointMassRobot | PlatformRobot, limits: Limits) -> None:

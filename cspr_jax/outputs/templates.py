@@ -27,7 +27,7 @@ from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import make_folders
 
 # Keys that are tables of their own; one of them is an array of tables.
-TABLES = ("axes", "trajectory", "orientations", "launch", "ellipse", "workspace", "limits", "run", "pose")
+TABLES = ("axes", "trajectory", "orientations", "launch", "ellipse", "workspace", "limits", "run", "winch", "pose")
 MANY = "pose"
 WIDTH = 100
 # Every robot has these, whatever else its file holds.

@@ -14,12 +14,11 @@ import numpy as np
 from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
-from cspr_jax.motion.limits import without_motors
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.verification.proved_answers import MotionProof, margins_of
-from cspr_jax.verification.verifier import Verifier
+from cspr_jax.verification.verifier import Verifier, of_family
 
 
 class VerifiedLeg(Leg):
@@ -32,15 +31,15 @@ class VerifiedLeg(Leg):
 
     def check(self, problem: Problem) -> None:
         """Let the family check the problem; see `Leg.check`."""
-        self._leg.check(_of_family(problem))
+        self._leg.check(of_family(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers of the family, which ignores obstacles, pulleys and winches; see `Leg.answers`."""
-        return self._leg.answers(_of_family(problem), depths)
+        return self._leg.answers(of_family(problem), depths)
 
     def warnings(self, problem: Problem) -> list[str]:
         """Warnings of the family; see `Leg.warnings`."""
-        return self._leg.warnings(_of_family(problem))
+        return self._leg.warnings(of_family(problem))
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
         """Result from the family's answers; see `Leg.result`."""
@@ -48,7 +47,7 @@ class VerifiedLeg(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by proved motions where there are any; see `Leg.join`."""
-        waypoints, plain, prescribed = self.waypoints, _of_family(problem), self.waypoints.arcs
+        waypoints, plain, prescribed = self.waypoints, of_family(problem), self.waypoints.arcs
         has_scene = bool(waypoints.plan_file.obstacle_keys) or problem.robot.pulleys is not None
         verifier = Verifier(problem, scene_of_leg(problem.robot, waypoints) if has_scene else None)
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
@@ -84,12 +83,6 @@ def verified(leg: Leg, *, obstacles: bool, pulleys: bool, motors: bool) -> Leg:
     """A leg whose verdicts take obstacles, pulleys and limits of winches into account."""
     is_needed = FAMILIES[leg.waypoints.family].proof != "any" and (obstacles or pulleys or motors)
     return VerifiedLeg(leg) if is_needed else leg
-
-
-def _of_family(problem: Problem) -> Problem:
-    # Without what the family ignores, so that robots with and without winches share compiled functions.
-    robot = dataclasses.replace(problem.robot, pulleys=None, winches=None)
-    return problem._replace(robot=robot, limits=without_motors(problem.limits))
 
 
 def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> Answers:

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.motion.answers import Answers, replaced
-from cspr_jax.motion.limits import motor_limits_set
+from cspr_jax.motion.limits import motor_limits_set, without_motors
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.criteria import ALL, Parts
+from cspr_jax.verification.criteria import ALL, Parts, criteria
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of, proofs_of_each
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
@@ -110,9 +110,12 @@ class Verifier(NamedTuple):
         return VerifiedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
 
     def columns(self, join: Join, count: int, *, max_arcs: int) -> dict[str, np.ndarray]:
-        """Columns of a map of motions among obstacles, equal to the answers of plans of single cells."""
+        """Columns of a map of motions with obstacles or winches, equal to the answers of plans of single cells."""
         answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=1, max_arcs=max_arcs)
-        clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
+        if not self.parts.contacts:
+            return answers.arrays()
+        first = len(criteria(self.problem.robot, self.problem.limits, self.scene, self.parts._replace(contacts=False)))
+        clearance = np.array([np.nan if proof is None else proof.proof.high[first:].min() for proof in proofs])
         return answers.arrays() | {"clearance": clearance}
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
@@ -147,3 +150,9 @@ class Verifier(NamedTuple):
             if proved[i] < 1.0:
                 verdict[i] = Verdict.UNCERTAINTY if refuted[i] <= 1.0 else Verdict.UNDECIDED
         return dataclasses.replace(answers, tolerated=proved, not_tolerated=refuted)
+
+
+def of_family(problem: Problem) -> Problem:
+    """A problem without what families ignore, so that robots with and without winches share compiled functions."""
+    robot = dataclasses.replace(problem.robot, pulleys=None, winches=None)
+    return problem._replace(robot=robot, limits=without_motors(problem.limits))

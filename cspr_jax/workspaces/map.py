@@ -14,6 +14,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.motion.given_limits import static_limits
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.robots.cables import AnyRobot
@@ -50,6 +51,10 @@ class WorkspaceMap(GridMap):
         self._refuse_unused()
         self._limits = build_limits(robot_file, spec.limits, file)
         self._robot = centred(build_robot(robot_file, spec.trajectory, file))[0]
+        try:
+            self._limits = static_limits(self._robot, self._limits)
+        except InputError as error:
+            raise ConfigError(file, str(error)) from error
         self._row = PATTERNS[self._robot.pattern]
         if not self._row.is_body:
             for name in ("orientation", "orientations"):

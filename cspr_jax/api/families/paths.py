@@ -25,6 +25,7 @@ from cspr_jax.errors.arguments import PointsOfPaths, Positive, QuaternionsOfPath
 from cspr_jax.families.paths.batch import least_times
 from cspr_jax.families.paths.geometry.path_specs import path_through
 from cspr_jax.families.paths.geometry.section import Section
+from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
@@ -109,6 +110,7 @@ def least_time_paths(
     with double_precision():
         file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["path"].legs])
         problem = build_problem(file, spec, spec, NAME, any_cables=True)
+        check_no_means(problem.limits, "limits.")
         axes = frame_of(file.base_points, file.z_axis)
         reference = reference_of(build_robot(file, spec, NAME))
         sections = [

@@ -8,10 +8,12 @@ from cspr_jax.config.keys.limits import NotNegativePerCable, PerCable, one_or_ea
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
 from cspr_jax.robots.model.winch_numbers import LINE, LOAD, TOGETHER, WINCH_LIMITS, WINCH_NUMBERS
+from cspr_jax.schema.limits import LIMITS
 
 _Sign = Annotated[float, Field(ge=-1, le=1)]
 Signs: Any = one_or_each(_Sign, _Sign)
 ROWS = (*WINCH_NUMBERS, *WINCH_LIMITS)
+WORDS = {row.name: row.description for row in LIMITS if row.of_winch}
 
 
 def _keys() -> dict[str, Any]:
@@ -19,7 +21,7 @@ def _keys() -> dict[str, Any]:
     for row in ROWS:
         kind = Signs if row.name == "direction" else NotNegativePerCable if row.from_zero else PerCable
         default = "" if row.default is None else f" (default {row.default:g})"
-        text = f"{row.description}, one number, or one per cable, {row.unit}{default}"
+        text = f"{WORDS.get(row.name, row.description)}, one number, or one per cable, {row.unit}{default}"
         fields[row.name] = (
             (kind, Field(description=text)) if row.is_required else (kind | None, Field(None, description=text))
         )

@@ -24,6 +24,7 @@ class FreeMap(ProvedMap):
     """The least duration that a search finds among all motions to each target; see `GridMap`."""
 
     from_rest = True
+    motors = True
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse a rest without a position, and cables without a largest tension; see `ProvedMap`."""

@@ -19,6 +19,8 @@ from cspr_jax.verification.proved_answers import proved_answers
 class PathsMap(ProvedMap):
     """The least duration of all motions along the path to each target; see `GridMap`."""
 
+    motors = True
+
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Read the keys of paths; see `ProvedMap`."""
         super().__init__(robot_file, spec, file)

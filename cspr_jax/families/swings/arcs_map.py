@@ -11,6 +11,7 @@ from cspr_jax.families.swings.arcs import arcs_and_segments, minimum_arcs
 from cspr_jax.families.swings.hypocycloid import Hypocycloid, batch_bounds
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.limits import has_motor_limits
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.schema.tiles import Grid
 
@@ -22,6 +23,7 @@ class MinimumArcsMap(PointMassMap):
 
     proves = True
     any_cables = True
+    motors = True
 
     def __init__(self, robot_file: RobotFile, sweep_file: SweepFile, file: object) -> None:
         """Refuse a planar robot, and build what all tiles use."""
@@ -34,14 +36,16 @@ class MinimumArcsMap(PointMassMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         points, max_arcs = (self._starts(cells), self._targets(cells), cells["z0"]), self._keys.trajectory.max_arcs
         settings: dict[str, Any] = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
-        if self._scene is None:
+        if self._scene is None and not has_motor_limits(self._problem.limits):
             return minimum_arcs(self._problem, *points, **settings).arrays()
-        # Import here: maps without obstacles need no general proof.
+        # Import here: maps without obstacles and winches need no general proof.
         from cspr_jax.verification.bounds.batch import MotionBatch
-        from cspr_jax.verification.verifier import Verifier
+        from cspr_jax.verification.verifier import Verifier, of_family
+
+        plain = of_family(self._problem)
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, MotionBatch]:
-            answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
+            answers, segments = arcs_and_segments(plain, *(x[rows] for x in points), arcs=arcs, **settings)
             motions = Hypocycloid(segments, self._problem.amplitude, as_float64(answers.tried_arcs))
             return answers, MotionBatch(motions, answers.duration, batch_bounds)
 

@@ -23,7 +23,6 @@ from cspr_jax.numerics.bounds.function_bounds import reciprocal
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.state_bounds import CableBounds
 from cspr_jax.robots.model.winches import STANDSTILL, Winches, radii
-from cspr_jax.schema.limits import Limit
 
 # Sides of friction along the last axis but one, and signs of a magnitude along the first of three or four.
 SIDES = np.array([[1.0], [-1.0]])
@@ -95,15 +94,15 @@ def torque_bounds(winches: Winches, motors: MotorBounds, tension: AffineBounds) 
 
 
 def motor_slack(
-    winches: Winches, row: Limit, limit: Float[Array, "n_cables"], motors: MotorBounds, tension: AffineBounds
+    winches: Winches, quantity: str, limit: Float[Array, "n_cables"], motors: MotorBounds, tension: AffineBounds
 ) -> Lines:
     """Lines around the slack of a limit of winches."""
-    if row.quantity == "motor_speed":
+    if quantity == "motor_speed":
         return _lines(_beside(motors.speed, 1) * -SIGNS[:, None] + limit[None]).least(1)
     value = torque_bounds(winches, motors, tension)
-    if row.quantity == "motor_power":
+    if quantity == "motor_power":
         value = value * _beside(motors.speed, 1)
-    if row.quantity == "motor_load":
+    if quantity == "motor_load":
         value = value * (1.0 / jnp.asarray(winches.stall_torque)[None])
         # Signs of the speed, of the torque, sides, and cables.
         room = _beside(_room_of_load(winches, limit, motors), 2, at=1)
@@ -119,10 +118,10 @@ class TensionLines(NamedTuple):
     high: Lines
 
     def narrowed(
-        self, winches: Winches, row: Limit, limit: Float[Array, "n_cables"], motors: MotorBounds
+        self, winches: Winches, quantity: str, limit: Float[Array, "n_cables"], motors: MotorBounds
     ) -> "TensionLines":
         """Tensions with which a limit of winches is kept, too."""
-        both = motors.over_sides(_tensions(winches, row, limit, motors))
+        both = motors.over_sides(_tensions(winches, quantity, limit, motors))
         # The largest of the smallest tensions is minus the least of their negatives.
         own = Lines(
             *(jnp.stack(x, axis=1) for x in ((self.high.below, -self.low.above), (self.high.above, -self.low.below)))
@@ -137,14 +136,14 @@ def tension_lines(low: Float[Array, "n_cables"], high: Float[Array, "n_cables"])
     return TensionLines(*(Lines(*[jnp.stack([side, side])] * 2) for side in (low, high)))
 
 
-def _tensions(winches: Winches, row: Limit, limit: Array, motors: MotorBounds) -> Lines:
+def _tensions(winches: Winches, quantity: str, limit: Array, motors: MotorBounds) -> Lines:
     # Lines around the largest tensions, and around minus the smallest, with which a limit is kept, (2, 2, sides, n).
     gain = _beside(_beside(reciprocal(motors.radius), 1) * winches.efficiency[None] ** SIDES, 1)
     own = _beside(motors.own_torque, 1) * -SIGNS[:, None, None]
-    if row.quantity == "motor_load":
+    if quantity == "motor_load":
         room = _beside(_room_of_load(winches, limit, motors) * jnp.asarray(winches.stall_torque)[None], 2, at=1)
         return _lines((room + _beside(own, 1)) * _beside(gain, 1)).least(1)
-    if row.quantity != "motor_power":
+    if quantity != "motor_power":
         return _lines((own + limit[None, None]) * gain)
     # The torque of a power grows without bound towards standstill.
     speed = motors.speed * jnp.where(motors.speed.middle < 0.0, -1.0, 1.0)

@@ -2,8 +2,6 @@
 
 import dataclasses
 
-from cspr_jax.schema.limits import LIMITS
-
 
 @dataclasses.dataclass(frozen=True)
 class WinchNumber:
@@ -71,7 +69,16 @@ WINCH_NUMBERS = (
 )
 # Numbers that are given together, or not at all.
 TOGETHER = (("layer_turns", "cable_length"), ("motor_stall_torque", "motor_no_load_speed"))
-# Limits of winches, whose rows are in `schema.limits`; keys of `[winch]` too.
-WINCH_LIMITS = tuple(WinchNumber(row.name, row.unit, row.description) for row in LIMITS if row.of_winch)
+# Limits of winches, keys of `[winch]` too: rows of `schema.limits`, which describe them.
+WINCH_LIMITS = tuple(
+    WinchNumber(name, unit, "limit of the motor")
+    for name, unit in (
+        ("motor_speed_max", "rad/s"),
+        ("motor_torque_max", "N m"),
+        ("motor_power_max", "W"),
+        ("motor_load_max", "1"),
+        ("motor_torque_rms_max", "N m"),
+    )
+)
 # Line, and the limit that it sets to 1 where no other value is given.
 LINE, LOAD = TOGETHER[1][0], "motor_load_max"

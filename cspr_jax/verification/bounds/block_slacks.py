@@ -188,9 +188,9 @@ def _of_motors(
     for row in motor_limits_set(limits):
         limit = jnp.asarray(getattr(limits, row.name))
         if robot.n_cables == robot.dof or not bounds_tensions(row):
-            parts.append(part_of(motor_slack(winches, row, limit, motors, tensions.tension)))
+            parts.append(part_of(motor_slack(winches, row.quantity, limit, motors, tensions.tension)))
             continue
-        allowed = allowed.narrowed(winches, row, limit, motors)
+        allowed = allowed.narrowed(winches, row.quantity, limit, motors)
         outer = allowed.low.below, allowed.high.above
         narrow = witness_tensions(matrix, wrench, allowed.low.above, allowed.high.below, outer)
         parts.append(_lines(narrow.below[:, None], narrow.above[:, None]))

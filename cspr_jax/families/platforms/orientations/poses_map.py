@@ -18,6 +18,7 @@ from cspr_jax.families.platforms.motion_checker import MANY
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, batch_bounds
 from cspr_jax.families.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.maps.grid_map import PlatformMap
+from cspr_jax.motion.limits import has_motor_limits, without_motors
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.statics.reference_pose import reference_pose
 from cspr_jax.schema.quantities import TILT_TORSION
@@ -29,6 +30,7 @@ class PosesMap(PlatformMap):
 
     proves = True
     any_cables = True
+    motors = True
 
     def __init__(self, robot_file: RobotFile, spec: SweepFile, file: object) -> None:
         """Refuse a start whose quaternion is no orientation."""
@@ -38,8 +40,10 @@ class PosesMap(PlatformMap):
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
         from_rest = start is None or start.rest
-        self._checker = pose_checker(self._problem, motion_kind(spec.trajectory, from_rest=from_rest), batch=MANY)
         self._scene = self._scene_or_none(robot_file)
+        self._is_verified = self._scene is not None or has_motor_limits(self._problem.limits)
+        plain = self._problem._replace(limits=without_motors(self._problem.limits))
+        self._checker = pose_checker(plain, motion_kind(spec.trajectory, from_rest=from_rest), batch=MANY)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -49,7 +53,7 @@ class PosesMap(PlatformMap):
         ends = (targets, orientations(self._frame, targets, angles))
         cell = np.arange(len(z0))
         motions = Candidates(starts, ends, z0, cell, (beta_hats, beta_hats))
-        columns = self._answers(motions).arrays() if self._scene is None else self._clear(motions)
+        columns = self._clear(motions) if self._is_verified else self._answers(motions).arrays()
         return columns | {"beta_hat": columns["beta_hat"][:, 1]}
 
     def _answers(self, motions: Candidates, arcs: np.ndarray | None = None) -> PlatformMotionAnswers:
@@ -58,8 +62,8 @@ class PosesMap(PlatformMap):
         return pose_arcs(self._checker, motions, fixed=arcs, **how)
 
     def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
-        # Return the columns of motions among obstacles, which are proved as those of a plan are. Import here: maps
-        # without obstacles need no general proof.
+        # Return the columns of motions with obstacles or winches, which are proved as those of a plan are. Import here:
+        # maps without these need no general proof.
         from cspr_jax.verification.bounds.batch import MotionBatch
         from cspr_jax.verification.verifier import Verifier
 
