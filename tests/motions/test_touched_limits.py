@@ -21,8 +21,8 @@ MASS, GRAVITY = 0.198, 9.81
 SMALL = 1e-6
 EXAMPLES = 6
 # Columns of the reports that have the extremes of what limits bound.
-COLUMNS = {row.name: row.name for row in LIMITS} | {"floor": "z_lowest"}
-FLAGS = {row.name: row.flag.text for row in LIMITS}
+COLUMNS = {row.name: row.name for row in LIMITS if not row.of_winch} | {"floor": "z_lowest"}
+FLAGS = {row.name: row.flag.text for row in LIMITS if not row.of_winch}
 FOUR = {"name": "four", "base_points": [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], "mass": 1.0}
 PROTOTYPE = {"name": "three", "base_points": BASE.tolist(), "mass": MASS}
 PULLEYS = PROTOTYPE | {"name": "small pulleys", "pulley_radius": 1e-6}

@@ -26,6 +26,7 @@ from cspr_jax.robots.model.platform import platform_robot
 from cspr_jax.robots.model.point_mass import planar_robot, plane_normal, point_mass_robot
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winch_numbers import WINCH_LIMITS
 from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
@@ -263,11 +264,13 @@ def test_a_limit_is_one_row():
     """Keys in files, fields of `Limits`, closed forms of point masses and values of a state: of each row one."""
     names, other = [row.name for row in LIMITS], {"uncertainty"}
     assert {field.name for field in dataclasses.fields(Limits)} - other == set(names)
-    assert set(limit_slacks.CLOSED) == {row.name for row in LIMITS}
+    assert set(limit_slacks.CLOSED) == {row.name for row in LIMITS if not row.of_winch}
     assert set(LimitTable.model_fields) - other - {"tension_margin"} == set(names) <= set(PlanFile.model_fields)
     assert {field.name for field in dataclasses.fields(Uncertainty)} == {row.name for row in UNCERTAINTIES}
-    assert set(LimitKeys.model_fields) == {row.name for row in LIMITS if row.per_cable} <= set(RobotFile.model_fields)
-    assert {row.quantity for row in LIMITS} == set(Values._fields)
+    own = {row.name for row in LIMITS if row.per_cable and not row.of_winch}
+    assert set(LimitKeys.model_fields) == own <= set(RobotFile.model_fields)
+    assert {row.name for row in LIMITS if row.of_winch} == {row.name for row in WINCH_LIMITS}
+    assert {row.quantity for row in LIMITS if not row.of_winch} == set(Values._fields)
     assert len({(row.quantity, row.sense) for row in LIMITS}) == len(names)
 
 
@@ -283,6 +286,7 @@ def test_slacks_of_limits_have_the_sign_of_the_limit(name):
         limits = {
             row: (value := getattr(now, row.quantity)) - fraction * abs(value) * (1.0 if row.sense == "least" else -1.0)
             for row in LIMITS
+            if not row.of_winch
         }
         return {row.name: slack(row, limit, getattr(now, row.quantity), scale) for row, limit in limits.items()}
 
