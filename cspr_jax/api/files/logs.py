@@ -152,6 +152,8 @@ def _compared(
     max_delay: float,
 ) -> LogComparison:
     times, warnings = np.asarray(read.times), [*planned.warnings, *read.notes]
+    if read.lengths is None and planned.problem.robot.axial_stiffness is not None:
+        warnings.append("cables are elastic: angles give their unstretched lengths, so that errors include the stretch")
     if not (-max_delay <= times[0] <= curves.duration + max_delay):
         warnings.append(f"times begin at {times[0]:.9g} s: counted from the first row")
         times = times - times[0]
