@@ -136,6 +136,8 @@ def test_files_read_back_give_the_poses_of_the_plan(tmp_path, plans, kind, endin
     for i in (0, 17, 64, 100, len(rows["t"]) - 1):
         lengths = np.array([_of_angle(winch, k, angle)[1] for k, angle in enumerate(points["angle"][i])])
         np.testing.assert_allclose(_pose(kind, lengths, rows["position"][i]), rows["position"][i], atol=1e-9)
+    # Way points lie on ticks: set points are those of the very instants.
+    np.testing.assert_allclose(rows["position"][[35, 65, 100]], _way(kind)[1][1:4], atol=1e-9)
 
 
 def _friction_side(speed):
