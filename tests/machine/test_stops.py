@@ -9,7 +9,7 @@ from oracles.stops import Hanging, least_stop
 from support.commands import cspr, strict_json
 
 import cspr_jax
-from cspr_jax.machine.stops import braking, dying_swings
+from cspr_jax.machine.stops import braking, dying_swings, free_stops
 from cspr_jax.machine.stops.instants import Instants
 from cspr_jax.motion.motion import states_at
 from cspr_jax.numerics.elementary import double_precision
@@ -166,7 +166,7 @@ def test_brakes_stay_on_the_path_and_begin_with_its_state():
         return Instants(times, places, rates, np.stack([-1.6 * c, -1.6 * s, zero], axis=1))
 
     instants = states_at_times(np.array([0.7]))
-    found = braking.brakes(states_at_times, instants, np.array([9.0]), 1.5, 9.81)
+    found = braking.brakes(states_at_times, instants, np.array([9.0]), 9.0, 1.5, 9.81)
     assert len(found) == braking.TRIED
     for one in found:
         first, last = _ends(one.motion)
@@ -178,6 +178,20 @@ def test_brakes_stay_on_the_path_and_begin_with_its_state():
         with double_precision():
             path = np.asarray(states_at(one.motion, np.linspace(0.0, 1.0, 50)).position)
         np.testing.assert_allclose(np.hypot(*path[:, :2].T), 0.4, atol=1e-4)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_short_stops_begin_with_the_state(turning):
+    instants = _states(np.random.default_rng(6), turning)
+    for one in free_stops.short_stops(instants, 1.5, 9.81, jumps=False):
+        first, last = _ends(one.motion)
+        for mine, theirs in zip(first, (instants.position, instants.velocity, instants.acceleration), strict=False):
+            np.testing.assert_allclose(mine, theirs[0], atol=1e-8)
+        if turning:
+            np.testing.assert_allclose(first[4], instants.angular_velocity[0], atol=1e-8)
+            np.testing.assert_allclose(first[5], instants.angular_acceleration[0], atol=1e-7)
+        for rate in [*last[1:3], *(last[4:6] if turning else [])]:
+            np.testing.assert_allclose(rate, 0.0, atol=1e-6)
 
 
 PLAN = """

@@ -25,11 +25,11 @@ StatesAt = Callable[[np.ndarray], Instants]
 
 
 def brakes(
-    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], z0: float, gravity: float
+    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], end: float, z0: float, gravity: float
 ) -> list[Candidate]:
-    """Stops along the path of motions, from their states at any time and the times at which they rest."""
+    """Stops along the path of motions, from their states at any time, the times at which they rest, and their end."""
     half, speeds = np.pi * np.sqrt(z0 / gravity), np.linalg.norm(instants.velocity, axis=1)
-    plans = list(_durations(instants.times, speeds / gravity, resting, half))
+    plans = list(_durations(instants.times, speeds / gravity, resting, half, end))
     if not plans:
         return []
     u = np.linspace(0.0, 1.0, KNOTS)
@@ -60,13 +60,16 @@ def rests_ahead(
     return candidates
 
 
-def _durations(times: np.ndarray, braking: np.ndarray, resting: np.ndarray, half: float) -> Iterator[tuple[int, float]]:
+def _durations(
+    times: np.ndarray, braking: np.ndarray, resting: np.ndarray, half: float, end: float
+) -> Iterator[tuple[int, float]]:
     for k, (time, unit) in enumerate(zip(times.tolist(), braking.tolist(), strict=True)):
         later = resting[resting > time]
-        end = later[0] if len(later) else times.max()
+        ahead = (later[0] if len(later) else end) - time
         low = max(SHORTEST * unit, LEAST * half)
-        high = min(max(LONGEST * unit, half), 2.0 * (end - time))
-        yield from ((k, duration) for duration in np.geomspace(low, high, TRIED).tolist() if high > low)
+        high = min(max(LONGEST * unit, half), 2.0 * ahead)
+        if high > low:
+            yield from ((k, duration) for duration in np.geomspace(low, high, TRIED).tolist())
 
 
 def _along(k: int, part: Instants, times: np.ndarray, rate: np.ndarray, slowing: np.ndarray, z0: float) -> Candidate:

@@ -6,14 +6,17 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.families.free.poses import check_searched
 from cspr_jax.machine.stops.braking import StatesAt, brakes, rests_ahead
 from cspr_jax.machine.stops.candidates import Candidate, Stop, fastest_proved, hermite_spline, proved
 from cspr_jax.machine.stops.dying_swings import dying_swings
-from cspr_jax.machine.stops.free_stops import free_stops
+from cspr_jax.machine.stops.free_stops import free_stops, short_stops
 from cspr_jax.machine.stops.instants import RESTING, Instants, instants_of
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
@@ -24,6 +27,8 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.runtime.stages import stage
 
+# A motion begins with a state if it misses it by at most this part of the robot's radius, of gravity and so on.
+JOINED = 1e-6
 # Largest tensions of searches for robots that have none, over their weight: without one, the least time is that of
 # impulses.
 LARGEST_TENSION = 2.0
@@ -96,7 +101,11 @@ def fastest_stops(emergency: Emergency, sequence: MotionSequence, times: Float[n
         stage("stops: free motions")
         _put(stops, _free(emergency, instants, left))
     stage("stops: along the path")
-    ladder = brakes(states_at, instants, resting, z0, gravity) + rests_ahead(states_at, instants, resting, z0, gravity)
+    short = short_stops(instants, z0, gravity, jumps=emergency.jumps)
+    _put(stops, fastest_proved(problem, scene, [one for one in short if _is_faster(one, stops)]))
+    ladder = brakes(states_at, instants, resting, float(sequence.durations.sum()), z0, gravity) + rests_ahead(
+        states_at, instants, resting, z0, gravity
+    )
     _put(stops, fastest_proved(problem, scene, [one for one in ladder if _is_faster(one, stops)]))
     slower = np.array([k for k, stop in enumerate(stops) if stop is None or stop.kind == "path"], int)
     if len(slower) and _is_searched(problem):
@@ -172,12 +181,31 @@ def _bounded(problem: Problem) -> Problem:
     return problem._replace(limits=limits)
 
 
+def begins_with(instants: Instants, k: int, motion: Spline, emergency: Emergency) -> bool:
+    """Tell whether a motion begins with the state of an instant: rounding spoils accelerations of very short ones."""
+    state, robot = jax.tree.map(np.asarray, motion.state(jnp.asarray(0.0))), emergency.problem.robot
+    gravity, radius = float(robot.gravity), float(spool_radius(robot))
+    speed = np.sqrt(gravity * radius)
+    pairs = [(state.position, instants.position[k], radius), (state.velocity, instants.velocity[k], speed)]
+    pairs += [] if emergency.jumps else [(state.acceleration, instants.acceleration[k], gravity)]
+    if instants.angular_velocity is not None and instants.angular_acceleration is not None:
+        pairs.append((state.angular_velocity, instants.angular_velocity[k], speed / radius))
+        turning = (
+            []
+            if emergency.jumps
+            else [(state.angular_acceleration, instants.angular_acceleration[k], gravity / radius)]
+        )
+        pairs += turning
+    return all(np.abs(mine - theirs).max() <= JOINED * unit for mine, theirs, unit in pairs)
+
+
 def _free(emergency: Emergency, instants: Instants, left: np.ndarray, *, again: bool = False) -> dict[int, Stop]:
     bounded = _bounded(emergency.problem)
     rows, motions, answers = free_stops(
         bounded, emergency.scene, instants.take(left), emergency.z0, jumps=emergency.jumps, again=again
     )
-    chosen = np.flatnonzero(answers.feasible)
+    joined = [begins_with(instants, int(left[k]), motion, emergency) for k, motion in zip(rows, motions, strict=True)]
+    chosen = np.flatnonzero(answers.feasible & np.array(joined, bool))
     found: dict[int, Any] = {int(left[rows[i]]): Stop("free", motions[i], answers.proof[i]) for i in chosen.tolist()}
     if bounded is emergency.problem or not found:
         return found

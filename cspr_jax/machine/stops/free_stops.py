@@ -12,13 +12,17 @@ from cspr_jax.families.free.poses import FreePoses
 from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks
+from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
 from cspr_jax.machine.stops.instants import Instants
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.contacts.clearance import Scene
 
 # Numbers of intervals of the first search and of the final motion.
 MESHES = ((10, 28), (16, 40))
+# Durations of short stops over half a swing: from, to, number.
+SHORT = (3e-3, 0.1, 10)
 # Durations of the motions from which searches start: multiples of the time in which gravity would take the speed away,
 # added to a fraction of half a swing; how far they go on with the speed, over speed times duration; and how far their
 # ends lie towards the point below the centroid of the spools.
@@ -38,6 +42,39 @@ def free_stops(
     pairs = [_poses(instants, k, z0, jumps=jumps) for k in range(len(instants))]
     found = free_motions(problem, scene, pairs, MESHES, lambda tasks: _starts(tasks, z0, again=again))
     return found.indices, found.motions, found.answers
+
+
+def short_stops(instants: Instants, z0: float, gravity: float, *, jumps: bool) -> list[Candidate]:
+    """Single quintics to rest, for instants so near to rest that rounding spoils what a search finds."""
+    half, candidates = np.pi * np.sqrt(z0 / gravity), []
+    for k in range(len(instants)):
+        for duration in (half * np.geomspace(*SHORT)).tolist():
+            times, zero = np.array([0.0, duration]), np.zeros(3)
+            acceleration = zero if jumps else instants.acceleration[k]
+            end = instants.position[k] + _halted(instants.velocity[k], acceleration, duration)
+            values = [instants.position[k], end], [instants.velocity[k], zero], [acceleration, zero]
+            turning = _turning(instants, k, duration, jumps=jumps)
+            candidates.append(
+                Candidate(k, "free", hermite_spline(times, [np.array(one) for one in values], turning, z0))
+            )
+    return candidates
+
+
+def _halted(rate: np.ndarray, second: np.ndarray, duration: float) -> np.ndarray:
+    # Displacement with which the quintic to rest is a quartic: the speed falls as a cubic.
+    return 0.5 * duration * rate + duration**2 * second / 12.0
+
+
+def _turning(instants: Instants, k: int, duration: float, *, jumps: bool) -> list[np.ndarray] | None:
+    # Quaternions (1, v) q0, of any norm, at both ends, with two derivatives.
+    if instants.quaternion is None or instants.angular_velocity is None or instants.angular_acceleration is None:
+        return None
+    rate, second = 0.5 * instants.angular_velocity[k], 0.5 * instants.angular_acceleration[k] * (not jumps)
+    zero, start = np.zeros(3), np.repeat(instants.quaternion[[k]], 2, axis=0)
+    values = [zero, _halted(rate, second, duration)], [rate, zero], [second, zero]
+    scalars = np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    pairs = zip(scalars, values, strict=True)
+    return [products(np.concatenate([one[:, None], np.array(vectors)], axis=1), start) for one, vectors in pairs]
 
 
 def _poses(instants: Instants, k: int, z0: float, *, jumps: bool) -> FreePoses:
