@@ -176,8 +176,13 @@ def test_brakes_stay_on_the_path_and_begin_with_its_state():
         np.testing.assert_allclose(last[0], ahead, atol=1e-9)
         np.testing.assert_allclose(last[1:], 0.0, atol=1e-9)
         with double_precision():
-            path = np.asarray(states_at(one.motion, np.linspace(0.0, 1.0, 50)).position)
-        np.testing.assert_allclose(np.hypot(*path[:, :2].T), 0.4, atol=1e-4)
+            states = states_at(one.motion, np.linspace(0.0, 1.0, 51))
+        path, rates, pulls = (np.asarray(part)[:, :2] for part in states[:3])
+        np.testing.assert_allclose(np.hypot(*path.T), 0.4, atol=1e-4)
+        # Half of the speed is left in the middle, where it falls by 15 / 8 of it in the time of the stop.
+        np.testing.assert_allclose(np.hypot(*rates[25]), 0.4, atol=1e-3)
+        slowing = pulls[25] @ rates[25] / np.hypot(*rates[25])
+        np.testing.assert_allclose(slowing, -0.8 * 1.875 / one.duration, rtol=1e-2)
 
 
 @pytest.mark.parametrize("turning", [False, True])
