@@ -21,7 +21,11 @@ EACH = {
     "pulley_axes": [[0.0, 0.0, -1.0], [0.0, 0.1, -1.0], [0.1, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0]],
 }
 ROBOT = {"name": "five", "mass": 1.0, "tension_min": 0.5, "cable_speed_max": [3.0, 3.1, 3.2, 3.3, 3.4]} | EACH
-WINCH = {"drum_radius": [0.02, 0.03, 0.04, 0.05, 0.06], "gear_ratio": 5.0}
+WINCH = {
+    "drum_radius": [0.02, 0.03, 0.04, 0.05, 0.06],
+    "gear_ratio": 5.0,
+    "motor_speed_max": [400.0, 410.0, 420.0, 430.0, 440.0],
+}
 POSES = [
     {"position": [0.0, 0.0, 1.5], "time": 0.0},
     {"position": [0.15, 0.1, 1.4], "time": 1.5},
