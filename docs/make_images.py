@@ -14,6 +14,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parent.parent
 RESULTS = "results/images"
 PICTURES = "docs/images/"
+FILE_COMMANDS = ("size", "stops")
 
 
 class Image(NamedTuple):
@@ -24,7 +25,7 @@ class Image(NamedTuple):
         seconds: that its commands took, on 2 cores that had other work too.
         plot: arguments of `cspr plot` after the results.
         sources: sweeps or plans in `sweeps`, one result each; empty: the one of the picture's name.
-        command: "run" for sweeps, "plan" for plans, "draw" for a script of its own.
+        command: "run" for sweeps, "plan" for plans, "draw" for a script of its own, or a command that draws a file.
         suffix: of the file.
     """
 
@@ -186,6 +187,19 @@ IMAGES = {
         command="draw",
         suffix=".gif",
     ),
+    "motor_sizes": Image(
+        "What a plan asks of three motors: torque over speed, and the motor's line.",
+        15,
+        sources=("docs/examples/camera_plan.toml",),
+        command="size",
+    ),
+    "stops": Image(
+        "Proved stops from instants of a plan, and how long they take.",
+        60,
+        "--instants 25",
+        sources=("docs/examples/camera_plan.toml",),
+        command="stops",
+    ),
     "concepts": Image("From start to target in five arcs, and the pseudotensions.", 8, command="draw"),
 }
 
@@ -204,6 +218,8 @@ def commands_of(name: str, folder: str = "") -> list[str]:
     sources = image.sources or (name,)
     if image.command == "draw":
         return [f"python docs/draw_{name}.py"]
+    if image.command in FILE_COMMANDS:
+        return [" ".join(["cspr", image.command, *sources, *image.plot.split(), f"--dpi 90 -o {folder}{name}.png"])]
     if image.command == "plan":
         results = [f"{RESULTS}/{source}.h5" for source in sources]
         made = [f"cspr plan sweeps/{s}.toml -o {r}" for s, r in zip(sources, results, strict=True)]
