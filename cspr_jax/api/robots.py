@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
+import jax
 import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
@@ -9,9 +13,10 @@ from cspr_jax.build.robots import load_robot as _load_robot
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Inertia, PointOfEachCable, Positive
 from cspr_jax.motion.given_limits import pair_limits
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import with_cables as _with_cables
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.robots.model.parallel_pairs import parallel_pairs
+from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot, platform_robot
 from cspr_jax.robots.model.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
 from cspr_jax.robots.model.point_mass import point_mass_robot as _point_mass_robot
@@ -117,13 +122,13 @@ def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
         the robot, in the same axes; its tensions are those of pairs, and its limits imply those of all six cables.
 
     Raises:
-        InputError: cables that do not form such pairs, a mass centre that is not between the points of a pair, or
-            contradictory limits.
+        InputError: cables that do not form such pairs, a mass centre that is not between the points of a pair,
+            contradictory limits, or winches that differ within a pair.
     """
     if not isinstance(robot, PlatformRobot) or robot.pattern != RIGID or robot.pulleys is not None:
         raise InputError("robot", getattr(robot, "name", robot), "a rigid platform on six cables without pulleys")
     pairs = parallel_pairs(robot.base_points, robot.platform_points)
-    return _point_mass_robot(
+    equivalent = _point_mass_robot(
         pairs.exit_points,
         mass=float(robot.mass),
         gravity=float(robot.gravity),
@@ -131,3 +136,18 @@ def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
         z_axis=robot.z_axis,
         limits=pair_limits(robot.limits, pairs),
     )
+    return dataclasses.replace(equivalent, **_of_pairs(robot, pairs))
+
+
+def _of_pairs(robot: PlatformRobot, pairs: ParallelPairs) -> dict[str, Any]:
+    # Parallel cables of one length add their stiffness, and one winch drives both.
+    changes: dict[str, Any] = {}
+    if robot.axial_stiffness is not None:
+        changes["axial_stiffness"] = as_float64(np.asarray(robot.axial_stiffness)[pairs.cables].sum(1))
+    if robot.winches is not None:
+        first, second = (jax.tree.map(lambda x, k=k: np.asarray(x)[pairs.cables[:, k]], robot.winches) for k in (0, 1))
+        if not all(jax.tree.leaves(jax.tree.map(np.array_equal, first, second))):
+            problem = "cables of a pair are on one winch, but their numbers differ"
+            raise InputError("robot.winches", None, "equal for both", problem=problem)
+        changes["winches"] = first
+    return changes

@@ -105,3 +105,17 @@ def test_wrong_numbers_are_refused(changes, words):
     with pytest.raises(InputError) as caught:
         _winches(**changes)
     assert str(caught.value).startswith(words)
+
+
+def test_a_pair_of_cables_is_on_one_winch():
+    six = cspr_jax.with_cables(
+        cspr_jax.parallel_pair_robot(0.8, 0.2, mass=2.0),
+        axial_stiffness=[1e4, 2e4, 3e4, 4e4, 5e4, 6e4],
+        winch={"drum_radius": [0.02, 0.02, 0.03, 0.03, 0.04, 0.04]},
+    )
+    three = cspr_jax.three_cable_equivalent(six)
+    assert three.axial_stiffness.tolist() == [3e4, 7e4, 11e4]
+    assert three.winches.drum_radius.tolist() == [0.02, 0.03, 0.04]
+    differing = cspr_jax.with_cables(six, winch={"drum_radius": [0.02, 0.03, 0.03, 0.03, 0.04, 0.04]})
+    with pytest.raises(InputError, match="their numbers differ"):
+        cspr_jax.three_cable_equivalent(differing)
