@@ -16,7 +16,7 @@ from cspr_jax.errors.arguments import ANY, PointOrPoints, Positive
 from cspr_jax.errors.given_numbers import Numbers
 from cspr_jax.machine.forward_kinematics.equilibrium import TAUT, equilibria
 from cspr_jax.machine.forward_kinematics.lengths import checked_lengths
-from cspr_jax.machine.forward_kinematics.solutions import Poses, Search
+from cspr_jax.machine.forward_kinematics.solutions import Search, SolvedPoses
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.robots.model.patterns import PATTERNS, Pattern
@@ -171,11 +171,13 @@ def forward(  # noqa: PLR0913
         return _answers(inner_robot, frame, poses, point or "origin", is_all=all_solutions)
 
 
-def _poses(search: Search, given: np.ndarray, starts: tuple[np.ndarray, np.ndarray] | None, *, is_all: bool) -> Poses:
+def _poses(
+    search: Search, given: np.ndarray, starts: tuple[np.ndarray, np.ndarray] | None, *, is_all: bool
+) -> SolvedPoses:
     is_every = is_all or search.is_closed
     if starts is None:
-        return search.every(given) if is_every else search.usual(given)
-    return search.nearest_first(search.every(given), *starts) if is_every else search.near(given, *starts)
+        return search.all_solutions(given) if is_every else search.usual(given)
+    return search.nearest_first(search.all_solutions(given), *starts) if is_every else search.near(given, *starts)
 
 
 def _weights(weights: Any, robot: Any) -> np.ndarray:
@@ -216,7 +218,7 @@ def _starts(
     return (mass_centres(robot, inner, turned) if point == "origin" else inner), turned
 
 
-def _answers(robot: Any, frame: Frame, poses: Poses, point: str, *, is_all: bool) -> ForwardKinematics:
+def _answers(robot: Any, frame: Frame, poses: SolvedPoses, point: str, *, is_all: bool) -> ForwardKinematics:
     # In the axes of the robot's file; positions are of the origin of the platform's axes, or of the mass centre.
     is_body, kept = PATTERNS[robot.pattern].is_body, slice(None if is_all else 1)
     inner, turns = poses.positions[:, kept], poses.quaternions[:, kept]

@@ -18,7 +18,7 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.errors.arguments import Kind, PictureSize, Positive
-from cspr_jax.machine.sizing import MotorDemands, holding_demands, joint_cycle, motor_demands, winding_curves
+from cspr_jax.machine.sizing import MotionDemands, holding_demands, joint_cycle, motor_demands, winding_curves
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.machine.sizing_report import WITH_FACTOR, size_object, size_table, worst
@@ -62,8 +62,8 @@ class Sizes:
 
     robot: str
     factor: float
-    each: dict[str, MotorDemands]
-    joint: MotorDemands
+    each: dict[str, MotionDemands]
+    joint: MotionDemands
     limits: dict[str, np.ndarray]
     curves: dict[str, dict[str, np.ndarray]]
 
@@ -184,7 +184,7 @@ class _Motions:
     def _motions(self) -> list[Motion]:
         return [motion for leg in self.plan.legs for motion in leg.motions]
 
-    def demands(self) -> MotorDemands:
+    def demands(self) -> MotionDemands:
         samples = self.plan.demands.samples.tolist()
         return motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
 
@@ -203,7 +203,7 @@ class _Poses:
     positions: np.ndarray
     quaternions: np.ndarray
 
-    def demands(self) -> MotorDemands:
+    def demands(self) -> MotionDemands:
         return holding_demands(self.robot, self.limits, self.positions, self.quaternions)
 
 

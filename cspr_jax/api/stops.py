@@ -23,8 +23,8 @@ from cspr_jax.curves.files import reference_of
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.arguments import Cables, Integer, PictureSize, Times
 from cspr_jax.errors.suggestions import with_suggestions
-from cspr_jax.machine.stops.candidates import Stop
-from cspr_jax.machine.stops.fastest import Emergency, MotionSequence, fastest_stops
+from cspr_jax.machine.stops.candidates import ProvedStop
+from cspr_jax.machine.stops.fastest import ConsecutiveMotions, Emergency, fastest_stops
 from cspr_jax.machine.stops.instants import BACK
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
@@ -120,7 +120,7 @@ def stops(
             return Stops(planned, none, gone, left)
         emergency = _emergency(planned, robot_file, jumps=bool(gone))
         motions = [motion for leg in planned.legs for motion in leg.motions]
-        sequence = MotionSequence(
+        sequence = ConsecutiveMotions(
             motions, planned.answers.duration, planned.frame, _reference(planned.robot_file, planned)
         )
         found = fastest_stops(emergency, sequence, at)
@@ -181,7 +181,7 @@ def _none(time: float) -> stop_report.PlannedStop:
 
 
 def _planned_stop(
-    time: float, stop: Stop | None, emergency: Emergency, sequence: MotionSequence
+    time: float, stop: ProvedStop | None, emergency: Emergency, sequence: ConsecutiveMotions
 ) -> stop_report.PlannedStop:
     if stop is None:
         return _none(time)

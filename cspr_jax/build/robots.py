@@ -51,10 +51,10 @@ PlatformName = Literal[
 def build_limits(robot_file: RobotFile, spec: LimitKeys, file: object) -> Limits:
     """Limits of a plan or sweep; where it gives none, those of the robot."""
     pairs, written = robot_file.pairs, robot_file.as_written
-    own = vars(robot_file) | ({} if written.winch is None else written.winch.limits)
+    of_robot = vars(robot_file) | ({} if written.winch is None else written.winch.limits)
     try:
-        given = robot_file.of_own_cables(vars(spec))
-        limits = limits_of(robot_file, given, own, "", len(written.base_points))
+        values = robot_file.of_own_cables(vars(spec))
+        limits = limits_of(robot_file, values, of_robot, "", len(written.base_points))
         return limits if pairs is None else pair_limits(limits, pairs)
     except InputError as error:
         raise ConfigError(file, str(error)) from error

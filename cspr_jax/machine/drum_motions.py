@@ -1,4 +1,4 @@
-"""What drums pay out along a motion, with exact derivatives in time, and the motors that drive them.
+"""Drums pay out lengths along a motion: these have exact derivatives in time, and motors that drive them.
 
 Cables without stretch: lengths and rates of `robots.cables.cable_motion`. Elastic ones: the drum pays out unstretched
 lengths, which depend on the tensions and so on the acceleration; speeds and accelerations are derivatives of the
@@ -28,7 +28,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 
 
 class DrumStates(NamedTuple):
-    """What drums pay out, (n_cables,) each: the unstretched length, m, its two derivatives in time, the tension, N."""
+    """Drums pay out an unstretched length, m, with two derivatives in time, at a tension, N; (n_cables,) each."""
 
     length: Array
     rate: Array
@@ -37,7 +37,7 @@ class DrumStates(NamedTuple):
 
 
 def drum_states(robot: AnyRobot, limits: Limits, motion: Motion, tau: Float[Array, ""], rule: str) -> DrumStates:
-    """What the drums pay out at one normalised time of a motion."""
+    """Compute what the drums pay out at one normalised time of a motion."""
     if robot.axial_stiffness is None:
         state = motion.state(tau)
         return DrumStates(*cable_motion(robot, state), cables.tensions(robot, state, limits, rule))
@@ -65,15 +65,15 @@ def _resting(state: State, drums: DrumStates) -> DrumStates:
     moving = [state.velocity, state.acceleration, state.angular_velocity, state.angular_acceleration]
     fastest = jnp.max(jnp.concatenate([jnp.abs(jnp.ravel(each)) for each in moving if each is not None]))
     rests = fastest <= AT_REST
-    still = [jnp.where(rests, 0.0, each) for each in (drums.rate, drums.acceleration)]
-    return drums._replace(rate=still[0], acceleration=still[1])
+    derivatives = [jnp.where(rests, 0.0, each) for each in (drums.rate, drums.acceleration)]
+    return drums._replace(rate=derivatives[0], acceleration=derivatives[1])
 
 
 @persistent_jit(static_argnames=("rule",))
 def drums_and_motors(
     robot: AnyRobot, limits: Limits, motion: Motion, tau: Float[Array, "k"], *, rule: str
 ) -> tuple[DrumStates, MotorStates | None]:
-    """What the drums pay out at k normalised times of a motion, and the states of the motors where there are any."""
+    """Compute what the drums pay out at k normalised times of a motion, and the states of motors, if any."""
 
     def one(t):
         drums = drum_states(robot, limits, motion, t, rule)

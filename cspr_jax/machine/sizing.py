@@ -40,8 +40,8 @@ CURVE = 400  # number of times along a motion in a picture
 
 
 @dataclasses.dataclass(frozen=True)
-class MotorDemands:
-    """What motions ask of n motors, (n,) each.
+class MotionDemands:
+    """Motions ask these magnitudes of n motors, (n,) each.
 
     Fields:
         torque: largest torque of either sign, N m.
@@ -78,19 +78,19 @@ def _worse(winches: Any, length: Array, rate: Array, acceleration: Array, tensio
     radius = radii(winches, length)
     speed, change = (-winches.gear_ratio * each / radius for each in (rate, acceleration))
     winding, paying = (torques(winches, radius, speed, change, tension, jnp.full_like(speed, s)) for s in (1.0, -1.0))
-    still, moving = (
+    static, moving = (
         jnp.where(jnp.abs(winding) >= jnp.abs(paying), winding, paying),
         jnp.where(speed > 0, winding, paying),
     )
-    torque, integrand = (jnp.where(jnp.abs(speed) <= slowest, still, moving) for slowest in (STANDSTILL, RESTS))
+    torque, integrand = (jnp.where(jnp.abs(speed) <= slowest, static, moving) for slowest in (STANDSTILL, RESTS))
     return speed, torque, integrand
 
 
 @partial(jax.jit, static_argnames=("rule",))
 def _holding(robot: AnyRobot, limits: Limits, poses: tuple[Array, Array], *, rule: str) -> Array:
     def one(position, quaternion):
-        still = jnp.zeros(3)
-        state = State(position, still, still, matrix(quaternion), still, still, quaternion)
+        static = jnp.zeros(3)
+        state = State(position, static, static, matrix(quaternion), static, static, quaternion)
         tension, zero = cables.tensions(robot, state, limits, rule), jnp.zeros(robot.n_cables)
         length = cables.cable_motion(robot, state)[0]
         drum = unstretched_lengths(length, tension, robot.axial_stiffness)
@@ -101,12 +101,12 @@ def _holding(robot: AnyRobot, limits: Limits, poses: tuple[Array, Array], *, rul
 
 def holding_demands(
     robot: AnyRobot, limits: Limits, positions: Float[np.ndarray, "k 3"], quaternions: Float[np.ndarray, "k 4"]
-) -> MotorDemands:
-    """What poses at rest ask of the motors: the largest torques that hold them, by the most central tensions."""
+) -> MotionDemands:
+    """Compute what poses at rest ask of motors: the largest torques that hold them, by the most central tensions."""
     of_robot = partial(_holding, robot, limits, rule=CENTRED)
     torque = np.abs(in_batches(of_robot, (positions, quaternions), batch_size=BATCH)).max(0)
-    still, never = np.zeros_like(torque), np.full_like(torque, np.nan)
-    return MotorDemands(torque, still, still, still, never, never, never, np.nan)
+    zeros, never = np.zeros_like(torque), np.full_like(torque, np.nan)
+    return MotionDemands(torque, zeros, zeros, zeros, never, never, never, np.nan)
 
 
 def motor_demands(
@@ -115,8 +115,8 @@ def motor_demands(
     motions: Sequence[Motion],
     samples: Sequence[int],
     rule: str,
-) -> MotorDemands:
-    """What consecutive motions ask of the motors of a robot with winches."""
+) -> MotionDemands:
+    """Compute what consecutive motions ask of the motors of a robot with winches."""
     limits = limits if robot.n_cables > robot.dof else NO_LIMITS
     largest, sums, duration = [], [], 0.0
     for motion, count in zip(motions, samples, strict=True):
@@ -138,7 +138,7 @@ def motor_demands(
     n = robot.n_cables
     square, energy, regenerated = np.sum(sums, axis=0).reshape(3, n)
     torque, speed, power, braking = np.max(largest, axis=0).reshape(4, n)
-    return MotorDemands(torque, speed, power, braking, np.sqrt(square / duration), energy, regenerated, duration)
+    return MotionDemands(torque, speed, power, braking, np.sqrt(square / duration), energy, regenerated, duration)
 
 
 def _largest(states, tau: np.ndarray) -> np.ndarray:
@@ -173,20 +173,20 @@ def winding_curves(
     return np.concatenate(speeds), np.concatenate(torque)
 
 
-def joint_cycle(demands: Sequence[MotorDemands]) -> MotorDemands:
+def joint_cycle(of_motions: Sequence[MotionDemands]) -> MotionDemands:
     """Largest values of motions and poses at rest; root mean squares and energies of the motions in turn."""
     columns = {
-        name: np.max([getattr(each, name) for each in demands], axis=0)
+        name: np.max([getattr(each, name) for each in of_motions], axis=0)
         for name in ("torque", "speed", "power", "braking_power")
     }
-    moving = [each for each in demands if np.isfinite(each.duration)]
+    moving = [each for each in of_motions if np.isfinite(each.duration)]
     if not moving:
         never = np.full_like(columns["torque"], np.nan)
-        return MotorDemands(**columns, torque_rms=never, energy=never, regenerated_energy=never, duration=np.nan)
+        return MotionDemands(**columns, torque_rms=never, energy=never, regenerated_energy=never, duration=np.nan)
     duration = sum(each.duration for each in moving)
     square = np.sum([each.duration * each.torque_rms**2 for each in moving], axis=0) / duration
     energy = np.sum([each.energy for each in moving], axis=0)
     regenerated = np.sum([each.regenerated_energy for each in moving], axis=0)
-    return MotorDemands(
+    return MotionDemands(
         **columns, torque_rms=np.sqrt(square), energy=energy, regenerated_energy=regenerated, duration=duration
     )

@@ -115,10 +115,10 @@ def static_limits(robot: Any, limits: Limits) -> Limits:
     largest = {"motor_torque_max": limits.motor_torque_max, "motor_torque_rms_max": limits.motor_torque_rms_max}
     if limits.motor_load_max is not None:
         largest["motor_load_max"] = limits.motor_load_max * robot.winches.stall_torque
-    given = {name: np.asarray(torque) for name, torque in largest.items() if torque is not None}
+    torques = {name: np.asarray(torque) for name, torque in largest.items() if torque is not None}
     high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)
     low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
-    for name, torque in given.items():
+    for name, torque in torques.items():
         if robot.winches.layers is not None:
             allowed = "absent at rest on drums with layers, whose torques depend on lengths"
             raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
@@ -129,14 +129,14 @@ def static_limits(robot: Any, limits: Limits) -> Limits:
             allowed = "enough for the friction of each winch and for its cable's smallest tension"
             raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
     limits = without_motors(limits)
-    return dataclasses.replace(limits, tension_max=as_float64(high)) if given else limits
+    return dataclasses.replace(limits, tension_max=as_float64(high)) if torques else limits
 
 
 def check_motors(robot: PointMassRobot | PlatformRobot, limits: Limits) -> None:
     """Refuse limits of winches that cannot be proved."""
-    given = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
-    if given and limits.uncertainty is not None:
-        raise InputError("uncertainty", None, f"absent beside {given[0]}, a limit of winches", problem="given")
+    names = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
+    if names and limits.uncertainty is not None:
+        raise InputError("uncertainty", None, f"absent beside {names[0]}, a limit of winches", problem="given")
     if limits.motor_torque_rms_max is not None and robot.n_cables > robot.dof:
         value = np.asarray(limits.motor_torque_rms_max).tolist()
         allowed = "absent on more cables than degrees of freedom, since a motion does not determine their torques"

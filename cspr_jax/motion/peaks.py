@@ -127,8 +127,8 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
         "tension_margin": jnp.minimum(central - smallest, largest - central),
     }
     if robot.winches is not None:
-        demands = motor_demands(robot.winches, (length, rate, rate_derivative), force)
-        of_cables |= {name: -values for name, values in demands._asdict().items()}
+        of_motors = motor_demands(robot.winches, (length, rate, rate_derivative), force)
+        of_cables |= {name: -values for name, values in of_motors._asdict().items()}
     extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
         "depth_min": plane_normal(robot) @ state.position,
         "lowest": -lowest_depth(robot, state, corners),

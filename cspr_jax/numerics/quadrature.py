@@ -51,7 +51,7 @@ _OF_GAUSS = np.zeros(15)
 _OF_GAUSS[1::2] = np.concatenate([_GAUSS, _GAUSS[-2::-1]])
 NARROWEST = 1e-14  # width of an interval, as a fraction of all of them, that is not halved
 # Fraction of the tolerance that one interval may take.
-SHARE = 0.01
+FRACTION = 0.01
 
 
 def integrals(
@@ -63,11 +63,11 @@ def integrals(
     while len(low):
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         values = function((middle[:, None] + half[:, None] * POINTS).ravel()).reshape(len(low), len(POINTS), -1)
-        found = half[:, None] * np.einsum("p,kpm->km", WEIGHTS, values)
-        errors = np.abs(found - half[:, None] * np.einsum("p,kpm->km", _OF_GAUSS, values))
-        scale = np.abs(total + found.sum(0))
-        is_open = (errors > SHARE * tolerance * scale).any(1) & (half > NARROWEST * full)
-        total = total + found[~is_open].sum(0)
+        estimates = half[:, None] * np.einsum("p,kpm->km", WEIGHTS, values)
+        errors = np.abs(estimates - half[:, None] * np.einsum("p,kpm->km", _OF_GAUSS, values))
+        scale = np.abs(total + estimates.sum(0))
+        is_open = (errors > FRACTION * tolerance * scale).any(1) & (half > NARROWEST * full)
+        total = total + estimates[~is_open].sum(0)
         low, high, middle = low[is_open], high[is_open], middle[is_open]
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
     return total

@@ -80,8 +80,8 @@ def with_cables(
     if winch is not None:
         diameter = robot.cable_diameter if cable_diameter is None else cable_diameter
         changes["winches"] = winches_of(winch, robot.n_cables, diameter, "winch.")
-        own: dict[str, Any] = winch_limits(winch, robot.n_cables, "winch.")
-        changes["limits"] = dataclasses.replace(robot.limits, **own)
+        of_winch: dict[str, Any] = winch_limits(winch, robot.n_cables, "winch.")
+        changes["limits"] = dataclasses.replace(robot.limits, **of_winch)
     return dataclasses.replace(robot, **changes) if changes else robot
 
 

@@ -47,7 +47,7 @@ FLAGS = {
 AT_TIMES = (Verdict.SINGULAR, *FLAGS.values())
 
 
-class Parts(NamedTuple):
+class CriterionParts(NamedTuple):
     """Criteria that a proof is about, since the family of a motion may have proved the others.
 
     Fields:
@@ -61,7 +61,7 @@ class Parts(NamedTuple):
     contacts: bool = True
 
 
-ALL = Parts()
+ALL = CriterionParts()
 
 
 class Criterion(NamedTuple):
@@ -90,7 +90,9 @@ class Criterion(NamedTuple):
         return self.allowed + slack if self.sense == "least" else self.allowed - slack
 
 
-def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None, parts: Parts = ALL) -> list[Criterion]:
+def criteria(
+    robot: AnyRobot, limits: Limits, scene: Scene | None = None, parts: CriterionParts = ALL
+) -> list[Criterion]:
     """Criteria, in the order of their slacks."""
     rows: list[Criterion] = []
     if parts.usual:

@@ -23,7 +23,7 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.verification.criteria import ALL, AT_TIMES, Criterion, Parts, criteria, levels
+from cspr_jax.verification.criteria import ALL, AT_TIMES, Criterion, CriterionParts, criteria, levels
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
@@ -51,7 +51,7 @@ class MotionProof(NamedTuple):
     scales: np.ndarray
     obstacles: tuple[str, ...] = ()
     feeds: np.ndarray | None = None
-    parts: Parts = ALL
+    parts: CriterionParts = ALL
 
     @property
     def is_feasible(self) -> bool:
@@ -184,7 +184,7 @@ def proof_of(
     motion: Any,
     scene: Scene | None = None,
     *,
-    parts: Parts = ALL,
+    parts: CriterionParts = ALL,
     intervals: bool = True,
 ) -> MotionProof:
     """Proof of one motion; a motion without bounds or duration can only be refuted, by samples."""
@@ -207,7 +207,7 @@ def proofs_of(
     scene: Scene | None = None,
     jumps: Sequence[np.ndarray] = (),
     *,
-    parts: Parts = ALL,
+    parts: CriterionParts = ALL,
     intervals: bool = True,
 ) -> list[MotionProof]:
     """Proofs of several motions at once."""
@@ -238,18 +238,18 @@ def proofs_of_each(
         rows = [np.flatnonzero(index == i) for i in chosen]
         parts = [motions[i].bounds(start[row], end[row]) for i, row in zip(chosen, rows, strict=True)]
         order = np.argsort(np.concatenate(rows))
-        return jax.tree.map(lambda *leaves: np.concatenate([np.asarray(leaf) for leaf in leaves])[order], *parts)
+        return jax.tree.map(lambda *leaves: np.concatenate([np.asarray(array) for array in leaves])[order], *parts)
 
     jumps = [motion.jumps() if hasattr(motion, "jumps") else np.empty(0) for motion in motions]
     return proofs_of(problem, bounds, durations, scene, jumps, **how)
 
 
-def _criteria(problem: Problem, scene: Scene | None, parts: Parts) -> tuple[Criterion, ...]:
+def _criteria(problem: Problem, scene: Scene | None, parts: CriterionParts) -> tuple[Criterion, ...]:
     return tuple(criteria(problem.robot, problem.limits, scene, parts))
 
 
 def _proof(
-    problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None, parts: Parts
+    problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None, parts: CriterionParts
 ) -> MotionProof:
     names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
     return MotionProof(rows, proof, _scales(problem, rows), names, parts=parts)
@@ -290,7 +290,7 @@ def sampled_proof(
     scene: Scene | None = None,
     samples: int = SAMPLES,
     *,
-    parts: Parts = ALL,
+    parts: CriterionParts = ALL,
 ) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 

@@ -20,7 +20,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.criteria import ALL, Parts, criteria
+from cspr_jax.verification.criteria import ALL, CriterionParts, criteria
 from cspr_jax.verification.proved_answers import MotionProof, proofs_of, proofs_of_each
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 from cspr_jax.verification.smallest_proved import FEWER, NONE, UNDECIDED, smallest_proved
@@ -69,10 +69,10 @@ class Verifier(NamedTuple):
         return self.problem.robot.pulleys is not None
 
     @property
-    def parts(self) -> Parts:
+    def parts(self) -> CriterionParts:
         """Criteria that the family has not proved."""
         motors = bool(motor_limits_set(self.problem.limits))
-        return ALL if self.has_pulleys else Parts(usual=False, motors=motors, contacts=self.scene is not None)
+        return ALL if self.has_pulleys else CriterionParts(usual=False, motors=motors, contacts=self.scene is not None)
 
     def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> VerifiedSegments:
         """Smallest numbers of arcs whose motions are proved."""

@@ -50,8 +50,8 @@ class AnyCableGone(GridMap):
         answers[FREQUENCY] = np.minimum.reduce(columns[FREQUENCY])
         answers["orientation_fraction"] = columns["orientation_fraction"].min(0)
         answers["verdict"] = conjunction(np.bitwise_or.reduce(columns["verdict"]))
-        asked = next((columns[name] for name in MARGINS if not np.isnan(columns[name]).all()), None)
-        worst = np.zeros(count, int) if asked is None else np.where(np.isnan(asked), np.inf, asked).argmin(0)
+        margins = next((columns[name] for name in MARGINS if not np.isnan(columns[name]).all()), None)
+        worst = np.zeros(count, int) if margins is None else np.where(np.isnan(margins), np.inf, margins).argmin(0)
         answers["worst_cable"] = (worst + 1).astype(np.int16)
         nearest = np.where(np.isnan(columns["clearance"]), np.inf, columns["clearance"]).argmin(0)
         answers["nearest_bodies"] = columns["nearest_bodies"][nearest, np.arange(count)]

@@ -17,10 +17,10 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.attained import attained
-from cspr_jax.verification.criteria import Parts
+from cspr_jax.verification.criteria import CriterionParts
 from cspr_jax.verification.proved_answers import proof_of
 
-MOTORS = Parts(usual=False, motors=True, contacts=False)
+MOTORS = CriterionParts(usual=False, motors=True, contacts=False)
 BESIDE = 1e-3
 # Samples of the oracle, fewer where each is a linear program.
 DENSE = {"samples": 4001}

@@ -10,7 +10,7 @@ from support.commands import cspr, strict_json
 
 import cspr_jax
 from cspr_jax.machine.stops import braking, dying_swings, free_stops
-from cspr_jax.machine.stops.instants import Instants
+from cspr_jax.machine.stops.instants import StateSamples
 from cspr_jax.motion.motion import states_at
 from cspr_jax.numerics.elementary import double_precision
 
@@ -113,9 +113,9 @@ def _states(rng, turning=False):
     vectors = rng.normal(size=(5, 1, 3))
     place = vectors[0] * 0.3 + np.array([0.0, 0.0, 1.5])
     if not turning:
-        return Instants(np.zeros(1), place, vectors[1], vectors[2])
+        return StateSamples(np.zeros(1), place, vectors[1], vectors[2])
     q = rng.normal(size=(1, 4))
-    return Instants(np.zeros(1), place, vectors[1], vectors[2], q / np.linalg.norm(q), vectors[3], vectors[4])
+    return StateSamples(np.zeros(1), place, vectors[1], vectors[2], q / np.linalg.norm(q), vectors[3], vectors[4])
 
 
 def _ends(motion):
@@ -144,7 +144,7 @@ def test_dying_swings_begin_with_the_state_and_end_at_rest(turning):
 
 def test_a_level_swing_at_its_natural_frequency_obeys_its_equation():
     """Without a change of amplitude, acceleration is that of the pendulum: -g / z0 times the displacement."""
-    state = Instants(
+    state = StateSamples(
         np.zeros(1), np.array([[0.3, 0.0, 1.5]]), np.zeros((1, 3)), np.array([[-0.3 * 9.81 / 1.5, 0.0, 0.0]])
     )
     slow = dying_swings.dying_swings(state, 9.81, jumps=False)[len(dying_swings.HALVES) - 1].motion
@@ -163,7 +163,7 @@ def test_brakes_stay_on_the_path_and_begin_with_its_state():
         zero = np.zeros_like(times)
         places = np.stack([0.4 * c, 0.4 * s, 1.5 + zero], axis=1)
         rates = np.stack([-0.8 * s, 0.8 * c, zero], axis=1)
-        return Instants(times, places, rates, np.stack([-1.6 * c, -1.6 * s, zero], axis=1))
+        return StateSamples(times, places, rates, np.stack([-1.6 * c, -1.6 * s, zero], axis=1))
 
     instants = states_at_times(np.array([0.7]))
     found = braking.brakes(states_at_times, instants, np.array([9.0]), 9.0, 1.5, 9.81)

@@ -123,7 +123,7 @@ class Adjustment:
         return _Iterate(setup, poses, total, self.predictor(setup, poses), extra)
 
     def _prior(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # What is known of the nominal numbers, as measurements of them.
+        # The nominal numbers count as measurements with their known deviations.
         deviation, is_of_machine = self.predictor.measurements.prior, self.parameters.is_of_machine
         is_known = is_of_machine & np.isfinite(deviation)
         return np.eye(len(total))[is_known] / deviation, total[is_known] / deviation

@@ -18,7 +18,7 @@ from jax import Array
 from scipy.optimize import minimize, nnls
 
 from cspr_jax.machine.forward_kinematics.least_squares import lengths_in_lanes, moved
-from cspr_jax.machine.forward_kinematics.solutions import Poses, Search
+from cspr_jax.machine.forward_kinematics.solutions import Search, SolvedPoses
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
@@ -31,14 +31,14 @@ TAUT = 1e-6
 # Largest remainder of the weight that tensions of taut cables leave, over the weight.
 BALANCED = 1e-5
 # Curvature of the depth, over weight and size, above which a pose is no maximum of the depth.
-CURVED = 1e-6
+LARGEST_CURVATURE = 1e-6
 STARTS, MOST_ITERATIONS = 12, 300
 
 
 class Equilibria(NamedTuple):
     """Poses of equilibrium, with tensions (n, k, n_cables) N; 0 where a cable is slack."""
 
-    poses: Poses
+    poses: SolvedPoses
     tensions: np.ndarray
 
 
@@ -50,17 +50,17 @@ def equilibria(
         _equilibria_of(search, row, None if starts is None else (starts[0][i], starts[1][i]))
         for i, row in enumerate(lengths)
     ]
-    most = max(max(len(row) for row in rows), 1)
+    width = max(max(len(row) for row in rows), 1)
     n_cables = search.robot.n_cables
     count = len(rows)
-    positions, quaternions = np.full((count, most, 3), np.nan), np.full((count, most, 4), np.nan)
-    residuals, tensions = np.full((count, most, n_cables), np.nan), np.full((count, most, n_cables), np.nan)
-    steps, is_found = np.zeros((count, most), int), np.zeros((count, most), bool)
+    positions, quaternions = np.full((count, width, 3), np.nan), np.full((count, width, 4), np.nan)
+    residuals, tensions = np.full((count, width, n_cables), np.nan), np.full((count, width, n_cables), np.nan)
+    steps, is_found = np.zeros((count, width), int), np.zeros((count, width), bool)
     for i, row in enumerate(rows):
         for k, (pose, forces, residual, number, is_stable) in enumerate(row):
             positions[i, k], quaternions[i, k], residuals[i, k] = pose[:3], pose[3:], residual
             tensions[i, k], steps[i, k], is_found[i, k] = forces, number, is_stable
-    return Equilibria(Poses(positions, quaternions, residuals, is_found, steps), tensions)
+    return Equilibria(SolvedPoses(positions, quaternions, residuals, is_found, steps), tensions)
 
 
 def _equilibria_of(search: Search, lengths: np.ndarray, start: tuple[np.ndarray, np.ndarray] | None) -> list[tuple]:
@@ -69,12 +69,12 @@ def _equilibria_of(search: Search, lengths: np.ndarray, start: tuple[np.ndarray,
         starts = list(zip(positions[0], quaternions[0], strict=True))[: STARTS if search.row.is_body else 2]
     else:
         starts = [start]
-    found: list[tuple] = []
+    solutions: list[tuple] = []
     for position, quaternion in starts:
         one = _lowest(search, lengths, np.concatenate([position, quaternion]))
-        if one is not None and not any(_is_same(search, one[0], other[0]) for other in found):
-            found.append(one)
-    stable = [one for one in found if one[-1]] or found[:1]
+        if one is not None and not any(_is_same(search, one[0], other[0]) for other in solutions):
+            solutions.append(one)
+    stable = [one for one in solutions if one[-1]] or solutions[:1]
     return sorted(stable, key=lambda one: -one[0][2])
 
 
@@ -106,18 +106,18 @@ def _lowest(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple | No
 
 
 def _program(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, int]:
-    size, known = search.size, dict[bytes, tuple[np.ndarray, np.ndarray]]()
+    extent, precomputed = search.size, dict[bytes, tuple[np.ndarray, np.ndarray]]()
 
     def local(move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         key = move.tobytes()
-        if key not in known:
-            values, slopes = _local(search.robot, pose, move * size, search.radius)
-            known[key] = np.asarray(values) / size, np.asarray(slopes)
-        return known[key]
+        if key not in precomputed:
+            values, slopes = _local(search.robot, pose, move * extent, search.radius)
+            precomputed[key] = np.asarray(values) / extent, np.asarray(slopes)
+        return precomputed[key]
 
     slack = {
         "type": "ineq",
-        "fun": lambda move: lengths / size - local(move)[0][1:],
+        "fun": lambda move: lengths / extent - local(move)[0][1:],
         "jac": lambda move: -local(move)[1][1:],
     }
     result = minimize(
@@ -129,7 +129,7 @@ def _program(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple[np.
         options={"maxiter": MOST_ITERATIONS, "ftol": 1e-15},
     )
     is_good = np.isfinite(result.x).all()
-    return np.where(is_good, result.x, 0.0) * size, int(result.nit)
+    return np.where(is_good, result.x, 0.0) * extent, int(result.nit)
 
 
 def _is_stable(search: Search, pose: np.ndarray, tensions: np.ndarray, slopes: np.ndarray, weight: float) -> bool:
@@ -141,7 +141,7 @@ def _is_stable(search: Search, pose: np.ndarray, tensions: np.ndarray, slopes: n
     free = rows[int((singular > 1e-8).sum()) :]
     if not len(free):
         return True
-    return bool(np.linalg.eigvalsh(free @ curvature @ free.T).max() * search.size / weight <= CURVED)
+    return bool(np.linalg.eigvalsh(free @ curvature @ free.T).max() * search.size / weight <= LARGEST_CURVATURE)
 
 
 @jax.jit

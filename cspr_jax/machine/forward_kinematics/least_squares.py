@@ -91,8 +91,8 @@ def fitted(
     return first
 
 
-def _pass(robot: AnyRobot, cases: tuple[np.ndarray, ...], weights: np.ndarray, sizes, most: int) -> Fits:
-    settings = (weights, *(np.asarray(size) for size in sizes), np.asarray(most, np.int32))
+def _pass(robot: AnyRobot, cases: tuple[np.ndarray, ...], weights: np.ndarray, sizes, max_steps: int) -> Fits:
+    settings = (weights, *(np.asarray(extent) for extent in sizes), np.asarray(max_steps, np.int32))
 
     def kernel(batch):
         return _fit(robot, *(np.ascontiguousarray(x.T) for x in batch), *settings)
@@ -111,9 +111,9 @@ def _fit(
     positions: Float[Array, "3 k"],
     quaternions: Float[Array, "4 k"],
     weights: Float[Array, "n_cables"],
-    size: Float[Array, ""],
+    extent: Float[Array, ""],
     radius: Float[Array, ""],
-    most: Int[Array, ""],
+    max_steps: Int[Array, ""],
 ) -> tuple[Float[Array, "3 k"], Float[Array, "4 k"], Float[Array, "n_cables k"], Int[Array, "k"], Bool[Array, "k"]]:
     evaluate = partial(_evaluated, robot, lengths, weights, radius)
     residual, columns, cost = evaluate(positions, quaternions)
@@ -123,31 +123,35 @@ def _fit(
         *(zero + DAMPING, jnp.zeros(cost.shape, jnp.int32), ~jnp.isfinite(cost), jnp.zeros(cost.shape, bool)),
     )
 
-    def is_on(now: _Lanes) -> Array:
-        return ~jnp.all(now.is_over)
+    def is_on(current: _Lanes) -> Array:
+        return ~jnp.all(current.is_over)
 
-    def step(now: _Lanes) -> _Lanes:
-        move = _step(now, weights)
-        position, quaternion = moved(robot, now.position, now.quaternion, move, radius)
+    def step(current: _Lanes) -> _Lanes:
+        move = _step(current, weights)
+        position, quaternion = moved(robot, current.position, current.quaternion, move, radius)
         residual, columns, cost = evaluate(position, quaternion)
-        is_lower = (cost < now.cost) & ~now.is_over
+        is_lower = (cost < current.cost) & ~current.is_over
         length = jnp.sqrt(sum(x * x for x in move))
-        is_short = length <= SHORT * size
-        has_ended = is_short | (~is_lower & (length <= SHORT_WITHOUT_GAIN * size) & (now.damping <= DAMPING))
-        damping = jnp.where(is_lower, now.damping * LOWER, now.damping * HIGHER)
-        is_over = has_ended | (now.steps + 1 >= most) | (damping > MOST_DAMPING) | ~jnp.isfinite(length)
+        is_short = length <= SHORT * extent
+        has_ended = is_short | (~is_lower & (length <= SHORT_WITHOUT_GAIN * extent) & (current.damping <= DAMPING))
+        damping = jnp.where(is_lower, current.damping * LOWER, current.damping * HIGHER)
+        is_over = has_ended | (current.steps + 1 >= max_steps) | (damping > MOST_DAMPING) | ~jnp.isfinite(length)
 
         def chosen(new: Array, old: Array) -> Array:
             return jnp.where(jnp.broadcast_to(is_lower, old.shape), new, old)
 
         return _Lanes(
-            *(chosen(position, now.position), chosen(quaternion, now.quaternion), chosen(residual, now.residual)),
-            tuple(chosen(new, old) for new, old in zip(columns, now.columns, strict=True)),
-            chosen(cost, now.cost),
-            jnp.where(now.is_over, now.damping, damping),
-            now.steps + (~now.is_over).astype(jnp.int32),
-            now.is_over | is_over,
-            now.has_ended | (has_ended & ~now.is_over),
+            *(
+                chosen(position, current.position),
+                chosen(quaternion, current.quaternion),
+                chosen(residual, current.residual),
+            ),
+            tuple(chosen(new, old) for new, old in zip(columns, current.columns, strict=True)),
+            chosen(cost, current.cost),
+            jnp.where(current.is_over, current.damping, damping),
+            current.steps + (~current.is_over).astype(jnp.int32),
+            current.is_over | is_over,
+            current.has_ended | (has_ended & ~current.is_over),
         )
 
     end = lax.while_loop(is_on, step, start)
@@ -182,15 +186,16 @@ def lengths_in_lanes(robot: AnyRobot, position: Vector, quaternion: Vector) -> F
     return jnp.where(radius > 0.0, around.wrapped + around.free, jnp.sqrt(lanes.dot(ray, ray)))
 
 
-def _step(now: _Lanes, weights: Array) -> list[Array]:
+def _step(current: _Lanes, weights: Array) -> list[Array]:
     # Solution of the damped normal equations, lane by lane.
-    columns = now.columns
+    columns = current.columns
     weighted = [weights[:, None] * column for column in columns]
-    right = [jnp.sum(column * now.residual, axis=0) for column in weighted]  # minus the gradient: J is minus columns
+    # Minus the gradient: J is minus columns.
+    right = [jnp.sum(column * current.residual, axis=0) for column in weighted]
     matrix = [[jnp.sum(weighted[i] * columns[j], axis=0) for j in range(i + 1)] for i in range(len(columns))]
     floor = FLOOR * lanes.largest([matrix[i][i] for i in range(len(columns))]) + TINY
     for i in range(len(columns)):
-        matrix[i][i] = matrix[i][i] * (1.0 + now.damping) + floor
+        matrix[i][i] = matrix[i][i] * (1.0 + current.damping) + floor
     return _solved(matrix, right)
 
 
@@ -210,11 +215,11 @@ def _solved(matrix: list[list[Array]], right: list[Array]) -> list[Array]:
     middle: list[Array] = []
     for i in range(count):
         middle.append((right[i] - sum(factor[i][k] * middle[k] for k in range(i))) * inverse[i])
-    found: list[Array] = [middle[0]] * count
+    solution: list[Array] = [middle[0]] * count
     for i in reversed(range(count)):
-        below = sum(factor[k][i] * found[k] for k in range(i + 1, count))
-        found[i] = (middle[i] - below) * inverse[i]
-    return found
+        below = sum(factor[k][i] * solution[k] for k in range(i + 1, count))
+        solution[i] = (middle[i] - below) * inverse[i]
+    return solution
 
 
 def moved(
@@ -245,11 +250,11 @@ def _rotated(quaternion: Vector, vector: Vector) -> Float[Array, "4 k"]:
     scalar = jnp.where(square > 1e-12, jnp.cos(0.5 * angle), 1.0 - square / 8.0)
     x, y, z = (sine * part for part in vector)
     a, b, c, d = quaternion
-    turned = (
+    rotated = (
         scalar * a - x * b - y * c - z * d,
         scalar * b + x * a + y * d - z * c,
         scalar * c + y * a + z * b - x * d,
         scalar * d + z * a + x * c - y * b,
     )
-    norm = jnp.sqrt(sum(part * part for part in turned))
-    return jnp.stack([part / norm for part in turned])
+    norm = jnp.sqrt(sum(part * part for part in rotated))
+    return jnp.stack([part / norm for part in rotated])

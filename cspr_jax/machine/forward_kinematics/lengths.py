@@ -15,12 +15,12 @@ from cspr_jax.robots.model.winches import cable_lengths
 LARGEST_LENGTH = 1e6  # m
 
 
-def lengths_of(robot: Any, given: ArrayLike, *, is_angle: bool) -> Float[np.ndarray, "n n_cables"]:
+def lengths_of(robot: Any, source: ArrayLike, *, is_angle: bool) -> Float[np.ndarray, "n n_cables"]:
     """Lengths of cables, m, from lengths or angles of motors."""
-    values = np.atleast_2d(np.asarray(given, float))
+    values = np.atleast_2d(np.asarray(source, float))
     if values.shape[1] != robot.n_cables:
         allowed = f"finite numbers of shape ({robot.n_cables},) or (n, {robot.n_cables})"
-        raise InputError("lengths", f"shape {np.shape(given)}", allowed)
+        raise InputError("lengths", f"shape {np.shape(source)}", allowed)
     if is_angle:
         if robot.winches is None:
             raise InputError("angles", True, "False: the robot has no [winch], which gives lengths of angles")
@@ -28,9 +28,9 @@ def lengths_of(robot: Any, given: ArrayLike, *, is_angle: bool) -> Float[np.ndar
     return values
 
 
-def checked_lengths(robot: Any, given: ArrayLike, *, is_angle: bool) -> Float[np.ndarray, "n n_cables"]:
+def checked_lengths(robot: Any, source: ArrayLike, *, is_angle: bool) -> Float[np.ndarray, "n n_cables"]:
     """Lengths of cables, m, that are above 0."""
-    values, name = lengths_of(robot, given, is_angle=is_angle), "angles" if is_angle else "lengths"
+    values, name = lengths_of(robot, source, is_angle=is_angle), "angles" if is_angle else "lengths"
     bad = np.flatnonzero(~((values > 0.0) & (values <= LARGEST_LENGTH)).all(1))
     if len(bad):
         allowed = "lengths > 0, at most 1e6 m" if not is_angle else "angles that give lengths > 0, at most 1e6 m"

@@ -56,8 +56,8 @@ def candidates(
     """Poses near all solutions, and others: the index of the lengths of each, its position and its angle."""
     index, angles = _zeros(_coefficients(cables, lengths))
     singular = _singular_angles(cables)
-    every = np.repeat(np.arange(len(lengths)), len(singular))
-    index = np.concatenate([index, every])
+    of_singular = np.repeat(np.arange(len(lengths)), len(singular))
+    index = np.concatenate([index, of_singular])
     angles = np.concatenate([angles, np.tile(singular, len(lengths))])
     index, points, angles = _on_lines(cables, lengths, index, angles)
     return index, *_refined(cables, lengths[index], points, angles)
@@ -93,12 +93,12 @@ def _value(cables: Cables, lengths: np.ndarray, angle: float) -> Float[np.ndarra
 
 def _evaluated(coefficients: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # F and its derivative.
-    value, slope = coefficients[:, DEGREE].real.copy(), np.zeros(len(angles))
+    value, derivative = coefficients[:, DEGREE].real.copy(), np.zeros(len(angles))
     for k in range(1, DEGREE + 1):
         term = 2.0 * coefficients[:, DEGREE + k] * np.exp(1j * k * angles)
         value += term.real
-        slope -= k * term.imag
-    return value, slope
+        derivative -= k * term.imag
+    return value, derivative
 
 
 def _zeros(coefficients: Float[np.ndarray, "n 7"]) -> tuple[np.ndarray, Float[np.ndarray, "k"]]:
@@ -109,27 +109,27 @@ def _zeros(coefficients: Float[np.ndarray, "n 7"]) -> tuple[np.ndarray, Float[np
     index = np.repeat(np.arange(len(coefficients)), INTERVALS)
     half = np.pi / INTERVALS
     middle = np.tile(half * (2.0 * np.arange(INTERVALS) + 1.0), len(coefficients))
-    found_index, found = [], []
+    found_index, zeros = [], []
     for halving in range(HALVINGS + 1):
-        value, slope = _evaluated(coefficients[index], middle)
-        value, slope = np.abs(value), np.abs(slope)
-        bend = curvature[index] * half
-        is_open = value - slope * half - 0.5 * bend * half <= noise[index]
-        is_monotonic = is_open & (slope > bend)
+        value, derivative = _evaluated(coefficients[index], middle)
+        value, derivative = np.abs(value), np.abs(derivative)
+        derivative_change = curvature[index] * half
+        is_open = value - derivative * half - 0.5 * derivative_change * half <= noise[index]
+        is_monotonic = is_open & (derivative > derivative_change)
         if is_monotonic.any():
             of, angles = _bracketed(coefficients, index[is_monotonic], middle[is_monotonic], half, noise)
             found_index.append(of)
-            found.append(angles)
+            zeros.append(angles)
         is_left = is_open & ~is_monotonic
         index, middle = index[is_left], middle[is_left]
         is_crowded = np.bincount(index, minlength=len(coefficients))[index] > MOST_OPEN
         found_index.append(index[is_crowded])
-        found.append(middle[is_crowded])
+        zeros.append(middle[is_crowded])
         index, middle = index[~is_crowded], middle[~is_crowded]
         if halving < HALVINGS:
             half *= 0.5
             index, middle = np.repeat(index, 2), np.repeat(middle, 2) + np.tile([-half, half], len(middle))
-    return np.concatenate([*found_index, index]), np.concatenate([*found, middle])
+    return np.concatenate([*found_index, index]), np.concatenate([*zeros, middle])
 
 
 def _bracketed(
@@ -143,11 +143,11 @@ def _bracketed(
     index, low, high, middle = index[has_zero], low[has_zero], high[has_zero], middle[has_zero]
     grows = (at_high > at_low)[has_zero]
     for _ in range(BISECTIONS):
-        value, slope = _evaluated(coefficients[index], middle)
+        value, derivative = _evaluated(coefficients[index], middle)
         is_beyond = (value > 0.0) == grows
         high, low = np.where(is_beyond, middle, high), np.where(is_beyond, low, middle)
         with np.errstate(divide="ignore", invalid="ignore"):
-            newton = middle - value / slope
+            newton = middle - value / derivative
         is_inside = (newton >= low) & (newton <= high)
         middle = np.where(is_inside, newton, 0.5 * (low + high))
     return index, middle
@@ -160,10 +160,10 @@ def _singular_angles(cables: Cables) -> Float[np.ndarray, "k"]:
     (a, b), (c, d) = np.moveaxis(offsets[:, 1:] - offsets[:, :1], 0, -1)
     samples = a * d - b * c
     mean, across = samples.mean(), samples @ np.exp(-1j * angles) * (2.0 / 3.0)
-    size = abs(across)
-    if size == 0.0 or abs(mean) > size * (1.0 + 1e-9):
+    magnitude = abs(across)
+    if magnitude == 0.0 or abs(mean) > magnitude * (1.0 + 1e-9):
         return np.zeros(0)
-    turn = np.arccos(np.clip(-mean / size, -1.0, 1.0))
+    turn = np.arccos(np.clip(-mean / magnitude, -1.0, 1.0))
     return np.array([turn, -turn]) - np.angle(across)
 
 

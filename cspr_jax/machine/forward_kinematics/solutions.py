@@ -28,9 +28,9 @@ VERIFIED = 1e-12
 # Attachment points of two solutions that are closer than this, over the robot's size, are those of one: lengths tell
 # two such poses apart by their last digits only, since they differ by the square of the distance.
 SAME = 3e-6
-# Where the lengths of redundant cables differ by more than this, over the robot's size, further starts are tried.
+# Further starts are tried if lengths of redundant cables differ by more than this, over the robot's size.
 POOR = 1e-3
-# Of redundant cables, solutions beside the best fit at most so many times worse.
+# Solutions of redundant cables beside the best fit at most so many times worse.
 WORSE = 3.0
 SPATIAL_STARTS, PLANAR_STARTS = 64, 12
 BATCH = 4096
@@ -39,7 +39,7 @@ _COLUMNS = ("positions", "quaternions", "residuals", "is_found", "steps")
 
 
 @dataclasses.dataclass(frozen=True)
-class Poses:
+class SolvedPoses:
     """Solutions for n sets of lengths, k each, the chosen ones first.
 
     Fields:
@@ -58,12 +58,12 @@ class Poses:
     steps: np.ndarray
     is_complete: bool = False
 
-    def shaped(self, shape: tuple[int, int]) -> Poses:
+    def shaped(self, shape: tuple[int, int]) -> SolvedPoses:
         """The same solutions as another table."""
         changes = {name: getattr(self, name)[:, 0] for name in _COLUMNS}
         return dataclasses.replace(self, **{name: x.reshape(*shape, *x.shape[1:]) for name, x in changes.items()})
 
-    def taken(self, index: Int[np.ndarray, "n j"]) -> Poses:
+    def selected(self, index: Int[np.ndarray, "n j"]) -> SolvedPoses:
         """Some solutions of each set, in another order."""
         each = np.arange(len(index))[:, None]
         return dataclasses.replace(self, **{name: getattr(self, name)[each, index] for name in _COLUMNS})
@@ -95,23 +95,23 @@ class Search:
         usual = np.inf if self.is_redundant else MET * self.size
         self._tolerance = usual if tolerance is None else tolerance
 
-    def near(self, lengths: Float[np.ndarray, "n m"], positions: np.ndarray, quaternions: np.ndarray) -> Poses:
+    def near(self, lengths: Float[np.ndarray, "n m"], positions: np.ndarray, quaternions: np.ndarray) -> SolvedPoses:
         """The solution to which Gauss-Newton leads from one start each."""
         return self._one_each(self._fitted(lengths, positions, quaternions))
 
-    def usual(self, lengths: Float[np.ndarray, "n m"]) -> Poses:
+    def usual(self, lengths: Float[np.ndarray, "n m"]) -> SolvedPoses:
         """One solution each: that found from a level platform below the spools, or the first one that is found."""
         positions, quaternions = self._starts(lengths, np.array([IDENTITY]))
-        found = self._fitted_all(lengths, positions, quaternions)
-        poor = self._is_poor(found)
-        best = self._taken_first(found)
+        solutions = self._fitted_all(lengths, positions, quaternions)
+        poor = self._is_poor(solutions)
+        best = self._select_first(solutions)
         if poor.any():
-            others = self._taken_first(self._from_many(lengths[poor]))
+            others = self._select_first(self._from_many(lengths[poor]))
             for name in _COLUMNS:
                 getattr(best, name)[poor] = getattr(others, name)
         return best
 
-    def every(self, lengths: Float[np.ndarray, "n m"]) -> Poses:
+    def all_solutions(self, lengths: Float[np.ndarray, "n m"]) -> SolvedPoses:
         """All solutions, those first in which a robot at rest can hang, and of these the lowest."""
         if self.is_closed:
             return self._closed(lengths)
@@ -125,18 +125,18 @@ class Search:
         is_point = isinstance(self.robot, PointMassRobot) and self.robot.pulleys is None
         return is_point and self.robot.n_cables == self.robot.dof
 
-    def nearest_first(self, poses: Poses, positions: np.ndarray, quaternions: np.ndarray) -> Poses:
+    def nearest_first(self, poses: SolvedPoses, positions: np.ndarray, quaternions: np.ndarray) -> SolvedPoses:
         """Solutions in the order of their distances from one start each."""
         cosine = np.minimum(np.abs((poses.quaternions * quaternions[:, None]).sum(2)), 1.0)
-        turned = 2.0 * self.radius * self.row.is_body * np.sqrt(1.0 - cosine**2)
-        distances = np.linalg.norm(poses.positions - positions[:, None], axis=2) + turned
-        return poses.taken(np.lexsort((distances, ~poses.is_found), axis=1))
+        rotations = 2.0 * self.radius * self.row.is_body * np.sqrt(1.0 - cosine**2)
+        distances = np.linalg.norm(poses.positions - positions[:, None], axis=2) + rotations
+        return poses.selected(np.lexsort((distances, ~poses.is_found), axis=1))
 
     @property
     def _is_planar(self) -> bool:
         return self.robot.pattern == "1R2T" and self.robot.n_cables == self.robot.dof and self.robot.pulleys is None
 
-    def _closed(self, lengths: np.ndarray) -> Poses:
+    def _closed(self, lengths: np.ndarray) -> SolvedPoses:
         centres = spheres.centres_of(self._base, self.row.forces)
         count = len(lengths)
         positions, residuals = np.empty((count, 2, 3)), np.empty((count, 2, self.robot.n_cables))
@@ -150,7 +150,7 @@ class Search:
         in_parts(solve, count, PART)
         quaternions = np.broadcast_to(np.array(IDENTITY), (len(lengths), 2, 4))
         is_found = counts[:, None] > np.arange(2)
-        closed = Poses(positions, quaternions, residuals, is_found, np.zeros(is_found.shape, int), True)
+        closed = SolvedPoses(positions, quaternions, residuals, is_found, np.zeros(is_found.shape, int), True)
         missed = np.flatnonzero(counts == 0)
         if len(missed):  # the nearest pose instead
             start = positions[missed, 0] + 1e-3 * self.size * centres.normal
@@ -159,7 +159,7 @@ class Search:
             is_found[missed, 0] = self._is_solution(near.residuals, near.has_ended)
         return closed
 
-    def _planar(self, lengths: np.ndarray) -> Poses:
+    def _planar(self, lengths: np.ndarray) -> SolvedPoses:
         plane = np.array([0, 2])
         cables = Cables(self._base[:, plane], self._arms[:, plane])
         index, points, angles = planar_platforms.candidates(cables, lengths)
@@ -176,7 +176,7 @@ class Search:
         many = dataclasses.replace(self._distinct(many), is_complete=True)
         missed = np.flatnonzero(~many.is_found.any(1))
         if len(missed):  # the nearest pose instead
-            near = self._taken_first(self._from_many(lengths[missed]))
+            near = self._select_first(self._from_many(lengths[missed]))
             for name in ("positions", "quaternions", "residuals", "is_found"):
                 getattr(many, name)[missed, 0] = getattr(near, name)[:, 0]
         return many
@@ -184,10 +184,10 @@ class Search:
     def _fitted(self, lengths: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Fits:
         return fitted(self.robot, lengths, positions, quaternions, self._weights, (self.size, self.radius))
 
-    def _one_each(self, fits: Fits) -> Poses:
+    def _one_each(self, fits: Fits) -> SolvedPoses:
         is_found = self._is_solution(fits.residuals, fits.has_ended)
         positions, turns, residuals, steps = fits.positions, fits.quaternions, fits.residuals, fits.steps
-        return Poses(positions[:, None], turns[:, None], residuals[:, None], is_found[:, None], steps[:, None])
+        return SolvedPoses(positions[:, None], turns[:, None], residuals[:, None], is_found[:, None], steps[:, None])
 
     def _is_solution(self, residuals: np.ndarray, has_ended: np.ndarray) -> np.ndarray:
         is_met = np.asarray(np.abs(residuals).max(-1) <= self._tolerance)
@@ -197,14 +197,14 @@ class Search:
         """Starts of a search for several poses: positions (n, k, 3) and quaternions (n, k, 4), the level ones first."""
         return self._starts(lengths, _orientations(self.row.is_planar, self.row.is_body))
 
-    def _from_many(self, lengths: np.ndarray) -> Poses:
+    def _from_many(self, lengths: np.ndarray) -> SolvedPoses:
         return self._fitted_all(lengths, *self.starts(lengths))
 
-    def _fitted_all(self, lengths: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Poses:
+    def _fitted_all(self, lengths: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> SolvedPoses:
         count, starts = positions.shape[:2]
         each = np.repeat(lengths, starts, axis=0)
-        found = self._one_each(self._fitted(each, positions.reshape(-1, 3), quaternions.reshape(-1, 4)))
-        return found.shaped((count, starts))
+        solutions = self._one_each(self._fitted(each, positions.reshape(-1, 3), quaternions.reshape(-1, 4)))
+        return solutions.shaped((count, starts))
 
     def _starts(self, lengths: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # In each orientation attachment points lie on spheres about spools: so does the platform, about shifted ones.
@@ -222,20 +222,20 @@ class Search:
         turns = [np.broadcast_to(q, (*x.shape[:2], 4)) for q, x in zip(quaternions, positions, strict=True)]
         return np.concatenate(positions, axis=1), np.concatenate(turns, axis=1)
 
-    def _costs(self, poses: Poses) -> np.ndarray:
+    def _costs(self, poses: SolvedPoses) -> np.ndarray:
         with np.errstate(invalid="ignore"):
             costs = (self._weights * poses.residuals**2).sum(-1)
         return np.where(np.isfinite(costs), costs, np.inf)
 
-    def _is_poor(self, poses: Poses) -> np.ndarray:
-        # Whether further starts are worth trying, of each set of lengths.
+    def _is_poor(self, poses: SolvedPoses) -> np.ndarray:
+        # Tell for each set of lengths whether further starts are worth trying.
         if not self.is_redundant:
             return np.logical_not(poses.is_found.any(1))
         with np.errstate(invalid="ignore"):
             good = poses.is_found & (np.abs(poses.residuals).max(-1) <= POOR * self.size)
         return np.logical_not(good.any(1))
 
-    def _taken_first(self, poses: Poses) -> Poses:
+    def _select_first(self, poses: SolvedPoses) -> SolvedPoses:
         # The first solution, of redundant cables the best one; else the nearest pose.
         costs = self._costs(poses)
         if self.is_redundant:  # the first of those that are equally good: of mirror images, the lower one
@@ -244,9 +244,9 @@ class Search:
             )
         index = np.where(poses.is_found.any(1), poses.is_found.argmax(1), costs.argmin(1))
         index = np.where(self.is_redundant, np.where(poses.is_found, costs, np.inf).argmin(1), index)
-        return poses.taken(index[:, None])
+        return poses.selected(index[:, None])
 
-    def _distinct(self, poses: Poses) -> Poses:
+    def _distinct(self, poses: SolvedPoses) -> SolvedPoses:
         # Each solution once, in the order of the columns, and the nearest pose first where there is none.
         count, starts = poses.is_found.shape
         is_found = poses.is_found.copy()
@@ -254,25 +254,25 @@ class Search:
             rms = np.sqrt(np.where(is_found, self._costs(poses), np.inf))
             is_found &= rms <= np.maximum(WORSE * rms.min(1, keepdims=True), MET * self.size)
         points = self._attachments(poses)
-        kept: list[int] = []
+        previous: list[int] = []
         for k in range(starts):
-            for other in kept:
+            for other in previous:
                 with np.errstate(invalid="ignore"):
                     distance = np.abs(points[:, k] - points[:, other]).max((1, 2))
                 is_found[:, k] &= ~(is_found[:, other] & (distance <= SAME * self.size))
-            kept.append(k)
+            previous.append(k)
         costs = self._costs(poses)
         order = np.argsort(np.where(is_found, -1.0, costs), axis=1, kind="stable")
-        sorted_poses = dataclasses.replace(poses, is_found=is_found).taken(order)
+        sorted_poses = dataclasses.replace(poses, is_found=is_found).selected(order)
         return _first(sorted_poses, max(int(is_found.sum(1).max(initial=0)), 1)) if count else sorted_poses
 
-    def _attachments(self, poses: Poses) -> np.ndarray:
+    def _attachments(self, poses: SolvedPoses) -> np.ndarray:
         count, starts = poses.is_found.shape
         flat = poses.positions.reshape(-1, 3), poses.quaternions.reshape(-1, 4)
         points = in_batches(lambda x: geometry.attachments(self.robot, *x), flat, batch_size=BATCH)
         return points.reshape(count, starts, -1, 3)
 
-    def _ordered(self, poses: Poses) -> Poses:
+    def _ordered(self, poses: SolvedPoses) -> SolvedPoses:
         # Poses first in which cables hold the weight, then by height; of redundant cables by their residuals.
         count, starts = poses.is_found.shape
         low = -(poses.positions[..., 2])
@@ -282,7 +282,7 @@ class Search:
             flat = poses.positions.reshape(-1, 3), poses.quaternions.reshape(-1, 4)
             key = np.where(self._holds(*flat).reshape(count, starts), 0.0, 1.0)
         order = np.lexsort((low, key, ~poses.is_found), axis=1)
-        return poses.taken(order)
+        return poses.selected(order)
 
     def _holds(self, positions: np.ndarray, quaternions: np.ndarray) -> Bool[np.ndarray, "n"]:
         matrices = in_batches(
@@ -295,8 +295,8 @@ class Search:
         return is_regular & ((inverse @ loads[..., None])[..., 0] >= 0.0).all(1)
 
 
-def _first(poses: Poses, count: int) -> Poses:
-    return poses.taken(np.broadcast_to(np.arange(count), (len(poses.is_found), count)))
+def _first(poses: SolvedPoses, count: int) -> SolvedPoses:
+    return poses.selected(np.broadcast_to(np.arange(count), (len(poses.is_found), count)))
 
 
 def _rotated(quaternion: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -319,7 +319,7 @@ def _orientations(is_planar: bool, is_body: bool) -> Float[np.ndarray, "k 4"]:
 
 def _table(
     count: int, index: np.ndarray, positions: np.ndarray, quaternions: np.ndarray, residuals: np.ndarray
-) -> Poses:
+) -> SolvedPoses:
     # Lists of solutions of different lengths as one table, padded.
     order = np.argsort(index, kind="stable")
     index = index[order]
@@ -330,4 +330,4 @@ def _table(
     for table, values in zip(tables, (positions, quaternions, residuals), strict=True):
         table[index, column] = values[order]
     is_found = np.arange(width) < numbers[:, None]
-    return Poses(tables[0], tables[1], tables[2], is_found, np.zeros((count, width), int))
+    return SolvedPoses(tables[0], tables[1], tables[2], is_found, np.zeros((count, width), int))

@@ -48,7 +48,7 @@ def centres_of(points: Float[np.ndarray, "m 3"], axes: tuple[int, ...]) -> Centr
     inverse = np.linalg.pinv(differences, rcond=FLAT) if len(differences) else np.zeros((len(axes), 0))
     normal = np.zeros(3)
     if not is_kept.all():
-        # Of several directions that are left, the one nearest to the vertical.
+        # The direction nearest to the vertical is chosen if several are left.
         free = rows[~is_kept]
         down = free.T @ free[:, -1]
         across = down if np.linalg.norm(down) > FLAT else free[-1]
@@ -74,8 +74,8 @@ def _lanes(
     # Coordinates of the feet, and squares of the heights: sums over short axes are slow, so that each is written out.
     first, axes = centres.points[0], centres.axes
     offsets = (centres.points - first)[:, axes]
-    still = np.setdiff1d(range(3), axes)
-    squares = distances**2 - ((centres.points - fixed)[:, still] ** 2).sum(1)[:, None]
+    fixed_axes = np.setdiff1d(range(3), axes)
+    squares = distances**2 - ((centres.points - fixed)[:, fixed_axes] ** 2).sum(1)[:, None]
     right = squares[:1] - squares[1:] + (offsets[1:] ** 2).sum(1)[:, None]
     within = [
         sum((x * y for x, y in zip(row, right, strict=True)), np.zeros(len(distances.T))) for row in centres.inverse

@@ -22,7 +22,7 @@ HUBER = 2.0  # deviations, over their scale, from which on a length counts less
 RIVAL = 1.1  # another delay is named where its root mean square is at most so many times the best one's
 EQUAL = 1e-6  # errors over the deviation of the lengths that are as good as none
 # Root mean square of the lengths about their means, over the largest length, below which nothing moves.
-STILL = 1e-9
+STATIC = 1e-9
 
 Planned = Callable[[np.ndarray], np.ndarray]
 
@@ -51,7 +51,7 @@ def delay_of(
     """Delay of measured lengths, with gaps as NaN; `planned` and `rate` give lengths (n, m) and rates at times."""
     at_zero = planned(times)
     offsets = np.nanmedian(lengths - at_zero, axis=0)
-    if not np.nanstd(at_zero, axis=0).max() > STILL * np.abs(at_zero).max():
+    if not np.nanstd(at_zero, axis=0).max() > STATIC * np.abs(at_zero).max():
         return Delay(np.nan, np.nan, np.nan, offsets, is_at_edge=False)
     rows = np.unique(np.linspace(0, len(times) - 1, min(ROWS, len(times))).astype(int))
     trials = np.linspace(-largest, largest, CANDIDATES)
@@ -91,7 +91,7 @@ def _refined(
     value, offsets, deviation = start, np.zeros(lengths.shape[1]), np.inf
     for _ in range(STEPS):
         errors = lengths - planned(times - value)
-        slope = -rate(times - value)
+        derivative = -rate(times - value)
         is_given = np.isfinite(errors)
         offsets = np.nanmedian(errors, axis=0)
         centred = np.where(is_given, errors - offsets, 0.0)
@@ -101,8 +101,8 @@ def _refined(
         total = np.maximum(weights.sum(0), 1e-300)
         offsets = offsets + (weights * centred).sum(0) / total
         centred = np.where(is_given, errors - offsets, 0.0)
-        mean = (weights * slope).sum(0) / total
-        across = slope - mean
+        mean = (weights * derivative).sum(0) / total
+        across = derivative - mean
         information = float((weights * across**2).sum())
         if not information > 0.0:
             break

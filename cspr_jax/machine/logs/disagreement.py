@@ -71,9 +71,9 @@ def longer_rows(
     each = np.arange(len(best))
     second = np.where(np.arange(fractions.shape[1]) == best[:, None], -np.inf, fractions).max(1)
     is_one = (fractions[each, best] >= EXPLAINS) & (fractions[each, best] >= CLEARLY * second)
-    found = np.zeros(fractions.shape, bool)
-    found[each, best] = is_one & (errors[each, best] > threshold)
-    return found
+    is_longer = np.zeros(fractions.shape, bool)
+    is_longer[each, best] = is_one & (errors[each, best] > threshold)
+    return is_longer
 
 
 def intervals(times: Float[np.ndarray, "n"], is_inside: np.ndarray) -> list[tuple[float, float]]:

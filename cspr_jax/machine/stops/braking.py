@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
-from cspr_jax.machine.stops.instants import Instants
+from cspr_jax.machine.stops.instants import StateSamples
 from cspr_jax.numerics.shapes import Float
 
 KNOTS = 41  # of a stop
@@ -19,23 +19,23 @@ SPACING = 0.04  # largest distance of the knots of the planned motion, over half
 TRIED = 12  # durations
 # Durations are tried between these multiples of the time in which gravity would take the speed away, at least a
 # fraction of half a swing.
-SHORTEST, LONGEST, LEAST = 0.5, 30.0, 0.05
+SHORTEST, LONGEST, SMALLEST = 0.5, 30.0, 0.05
 
-StatesAt = Callable[[np.ndarray], Instants]
+StatesAt = Callable[[np.ndarray], StateSamples]
 
 
 def brakes(
-    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], end: float, z0: float, gravity: float
+    states_at: StatesAt, samples: StateSamples, resting: Float[np.ndarray, "n"], end: float, z0: float, gravity: float
 ) -> list[Candidate]:
     """Stops along the path of motions, from their states at any time, the times at which they rest, and their end."""
-    half, speeds = np.pi * np.sqrt(z0 / gravity), np.linalg.norm(instants.velocity, axis=1)
-    plans = list(_durations(instants.times, speeds / gravity, resting, half, end))
+    half, speeds = np.pi * np.sqrt(z0 / gravity), np.linalg.norm(samples.velocity, axis=1)
+    plans = list(_durations(samples.times, speeds / gravity, resting, half, end))
     if not plans:
         return []
     u = np.linspace(0.0, 1.0, KNOTS)
     further = u - 2.5 * u**4 + 3.0 * u**5 - u**6
     rate, slowing = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2), -30.0 * u**2 * (1.0 - u) ** 2
-    started = np.array([[instants.times[k], duration] for k, duration in plans])
+    started = np.array([[samples.times[k], duration] for k, duration in plans])
     states = states_at((started[:, :1] + started[:, 1:] * further).ravel())
     candidates = []
     for i, (k, duration) in enumerate(plans):
@@ -45,11 +45,11 @@ def brakes(
 
 
 def rests_ahead(
-    states_at: StatesAt, instants: Instants, resting: Float[np.ndarray, "n"], z0: float, gravity: float
+    states_at: StatesAt, samples: StateSamples, resting: Float[np.ndarray, "n"], z0: float, gravity: float
 ) -> list[Candidate]:
     """The motions themselves, up to the next time at which they rest."""
     half, candidates = np.pi * np.sqrt(z0 / gravity), []
-    for k, time in enumerate(instants.times.tolist()):
+    for k, time in enumerate(samples.times.tolist()):
         later = resting[resting > time]
         if not len(later):
             continue
@@ -66,13 +66,15 @@ def _durations(
     for k, (time, unit) in enumerate(zip(times.tolist(), braking.tolist(), strict=True)):
         later = resting[resting > time]
         ahead = (later[0] if len(later) else end) - time
-        low = max(SHORTEST * unit, LEAST * half)
+        low = max(SHORTEST * unit, SMALLEST * half)
         high = min(max(LONGEST * unit, half), 2.0 * ahead)
         if high > low:
             yield from ((k, duration) for duration in np.geomspace(low, high, TRIED).tolist())
 
 
-def _along(k: int, part: Instants, times: np.ndarray, rate: np.ndarray, slowing: np.ndarray, z0: float) -> Candidate:
+def _along(
+    k: int, part: StateSamples, times: np.ndarray, rate: np.ndarray, slowing: np.ndarray, z0: float
+) -> Candidate:
     # A motion along a path, at its knots: s' and s'' of its parameter.
     first, second = rate[:, None], slowing[:, None]
     velocity, acceleration = part.velocity * first, part.acceleration * first**2 + part.velocity * second
@@ -81,7 +83,7 @@ def _along(k: int, part: Instants, times: np.ndarray, rate: np.ndarray, slowing:
     )
 
 
-def _turning(part: Instants, first: np.ndarray, second: np.ndarray) -> list[np.ndarray] | None:
+def _turning(part: StateSamples, first: np.ndarray, second: np.ndarray) -> list[np.ndarray] | None:
     # Unit quaternions with two derivatives: q' = omega q / 2, q'' = alpha q / 2 - |omega|^2 q / 4.
     if part.quaternion is None or part.angular_velocity is None or part.angular_acceleration is None:
         return None

@@ -20,7 +20,7 @@ from cspr_jax.verification.proved_answers import MotionProof, proofs_of
 SAMPLES = 33  # samples of a motion that may refute it
 
 
-class Stop(NamedTuple):
+class ProvedStop(NamedTuple):
     """A motion to rest, in the axes of the kernels.
 
     Fields:
@@ -42,7 +42,7 @@ class Stop(NamedTuple):
 class Candidate(NamedTuple):
     """A motion to rest that is not proved yet, from one of the instants."""
 
-    instant: int
+    sample: int
     kind: str
     motion: Spline
 
@@ -63,20 +63,20 @@ def hermite_spline(
     return Spline(as_float64(times), as_float64(hermite(times, list(position))), turning, as_float64(z0))
 
 
-def fastest_proved(problem: Problem, scene: Scene | None, candidates: Sequence[Candidate]) -> dict[int, Stop]:
+def fastest_proved(problem: Problem, scene: Scene | None, candidates: Sequence[Candidate]) -> dict[int, ProvedStop]:
     """The fastest candidate that is proved, by instant."""
     left = [one for one, is_left in zip(candidates, _unrefuted(problem, scene, candidates), strict=True) if is_left]
     queues = dict[int, list[Candidate]]()
     for one in sorted(left, key=lambda one: one.duration):
-        queues.setdefault(one.instant, []).append(one)
-    stops = dict[int, Stop]()
+        queues.setdefault(one.sample, []).append(one)
+    fastest = dict[int, ProvedStop]()
     while queues:
         first = [queue.pop(0) for queue in queues.values()]
         for one, proof in zip(first, proved(problem, scene, [one.motion for one in first]), strict=True):
             if proof.is_feasible:
-                stops[one.instant] = Stop(one.kind, one.motion, proof)
-        queues = {k: queue for k, queue in queues.items() if queue and k not in stops}
-    return stops
+                fastest[one.sample] = ProvedStop(one.kind, one.motion, proof)
+        queues = {k: queue for k, queue in queues.items() if queue and k not in fastest}
+    return fastest
 
 
 def proved(problem: Problem, scene: Scene | None, motions: Sequence[Spline]) -> list[MotionProof]:

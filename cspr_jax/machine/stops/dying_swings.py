@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
-from cspr_jax.machine.stops.instants import BACK, Instants
+from cspr_jax.machine.stops.instants import BACK, StateSamples
 from cspr_jax.numerics.linear.rotations import products
 
 HALVES = (1, 2, 3, 4, 6, 8, 12, 16, 24)  # half swings until the amplitude is 0
@@ -20,31 +20,31 @@ KNOTS = 16  # per half swing, and one more
 NEAR = 1e-6  # smallest depth over z0 of a robot that can swing
 
 
-def dying_swings(instants: Instants, gravity: float, *, jumps: bool) -> list[Candidate]:
+def dying_swings(samples: StateSamples, gravity: float, *, jumps: bool) -> list[Candidate]:
     """Swings that die, from each instant; with `jumps` the acceleration may jump at the start."""
     return [
-        _swing(instants, k, float(depth * factor), gravity, halves, jumps=jumps)
-        for k, depth in enumerate(instants.position[:, 2].tolist())
+        _swing(samples, k, float(depth * factor), gravity, halves, jumps=jumps)
+        for k, depth in enumerate(samples.position[:, 2].tolist())
         for factor in DEPTHS
         for halves in HALVES
         if depth > NEAR
     ]
 
 
-def _swing(instants: Instants, k: int, z0: float, gravity: float, halves: int, *, jumps: bool) -> Candidate:
+def _swing(samples: StateSamples, k: int, z0: float, gravity: float, halves: int, *, jumps: bool) -> Candidate:
     omega = np.sqrt(gravity / z0)
     times = np.linspace(0.0, halves * np.pi / omega, KNOTS * halves + 1)
-    away = instants.position[k] - np.array([0.0, 0.0, z0])
+    away = samples.position[k] - np.array([0.0, 0.0, z0])
     cosine, sine = np.cos(omega * times)[:, None], np.sin(omega * times)[:, None]
-    swing = away * cosine + instants.velocity[k] / omega * sine
-    rate = -omega * away * sine + instants.velocity[k] * cosine
+    swing = away * cosine + samples.velocity[k] / omega * sine
+    rate = -omega * away * sine + samples.velocity[k] * cosine
     falls = falling(times / times[-1])
     a, a1, a2 = (part[:, None] / times[-1] ** order for order, part in enumerate(falls))
-    lacking = np.zeros(3) if jumps else instants.acceleration[k] + omega**2 * away
+    lacking = np.zeros(3) if jumps else samples.acceleration[k] + omega**2 * away
     position = [a * swing, a1 * swing + a * rate, a2 * swing + 2.0 * a1 * rate - omega**2 * a * swing]
     position = [one + other for one, other in zip(position, _vanishing(times, lacking, np.pi / omega), strict=True)]
     position[0] = position[0] + np.array([0.0, 0.0, z0])
-    return Candidate(k, "swing", hermite_spline(times, position, _level(instants, k, times), z0))
+    return Candidate(k, "swing", hermite_spline(times, position, _level(samples, k, times), z0))
 
 
 def falling(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -66,17 +66,21 @@ def _vanishing(times: np.ndarray, acceleration: np.ndarray, within: float) -> li
     return [part[:, None] * acceleration for part in (value, first, second)]
 
 
-def _level(instants: Instants, k: int, times: np.ndarray) -> list[np.ndarray] | None:
+def _level(samples: StateSamples, k: int, times: np.ndarray) -> list[np.ndarray] | None:
     # Quaternions (1, v) q0, of any norm, that turn by a quintic v to the reference orientation.
-    if instants.quaternion is None or instants.angular_velocity is None or instants.angular_acceleration is None:
+    if samples.quaternion is None or samples.angular_velocity is None or samples.angular_acceleration is None:
         return None
-    q0 = instants.quaternion[k]
+    q0 = samples.quaternion[k]
     back = (q0 if q0[0] >= 0.0 else -q0) * BACK
     end, duration = back[1:] / max(back[0], 0.5), times[-1]
-    b, c = 0.5 * duration * instants.angular_velocity[k], 0.25 * duration**2 * instants.angular_acceleration[k]
+    b, c = 0.5 * duration * samples.angular_velocity[k], 0.25 * duration**2 * samples.angular_acceleration[k]
     u = (times / duration)[:, None]
-    gap, slope, bend = end - b - c, -(b + 2.0 * c), -2.0 * c
-    x3, x4, x5 = 10 * gap - 4 * slope + 0.5 * bend, -15 * gap + 7 * slope - bend, 6 * gap - 3 * slope + 0.5 * bend
+    gap, derivative, second_derivative = end - b - c, -(b + 2.0 * c), -2.0 * c
+    x3, x4, x5 = (
+        10 * gap - 4 * derivative + 0.5 * second_derivative,
+        -15 * gap + 7 * derivative - second_derivative,
+        6 * gap - 3 * derivative + 0.5 * second_derivative,
+    )
     value = b * u + c * u**2 + x3 * u**3 + x4 * u**4 + x5 * u**5
     first = (b + 2 * c * u + 3 * x3 * u**2 + 4 * x4 * u**3 + 5 * x5 * u**4) / duration
     second = (2 * c + 6 * x3 * u + 12 * x4 * u**2 + 20 * x5 * u**3) / duration**2

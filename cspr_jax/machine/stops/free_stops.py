@@ -13,7 +13,7 @@ from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks
 from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
-from cspr_jax.machine.stops.instants import Instants
+from cspr_jax.machine.stops.instants import StateSamples
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.rotations import products
@@ -27,33 +27,33 @@ SHORT = (3e-3, 0.1, 10)
 # added to a fraction of half a swing; how far they go on with the speed, over speed times duration; and how far their
 # ends lie towards the point below the centroid of the spools.
 BRAKING, SHORTEST, ONWARD, CENTRED = (2.0, 5.0), 0.15, 0.4, (0.0, 0.6)
-# Those of a second search: durations over half a swing, and half swings of motions that come to rest in P0.
+# A second search has durations over half a swing, and half swings of motions that come to rest in P0.
 DURATIONS, TOWARDS, HALVES = (0.4, 0.8, 1.4), (0.4, 0.75, 1.0), (1, 2)
 
 
 def free_stops(
-    problem: Problem, scene: Scene | None, instants: Instants, z0: float, *, jumps: bool = False, again: bool = False
+    problem: Problem, scene: Scene | None, samples: StateSamples, z0: float, *, jumps: bool = False, again: bool = False
 ) -> tuple[np.ndarray, list[Spline], Answers]:
     """Indices of the instants for which motions are found, the motions, and their answers.
 
     With `jumps` the acceleration at the start is free, as after a cable has broken. A search made `again` starts
     from more and slower motions, where the first one has found nothing.
     """
-    pairs = [_poses(instants, k, z0, jumps=jumps) for k in range(len(instants))]
-    found = free_motions(problem, scene, pairs, MESHES, lambda tasks: _starts(tasks, z0, again=again))
-    return found.indices, found.motions, found.answers
+    pairs = [_poses(samples, k, z0, jumps=jumps) for k in range(len(samples))]
+    solutions = free_motions(problem, scene, pairs, MESHES, lambda tasks: _starts(tasks, z0, again=again))
+    return solutions.indices, solutions.motions, solutions.answers
 
 
-def short_stops(instants: Instants, z0: float, gravity: float, *, jumps: bool) -> list[Candidate]:
+def short_stops(samples: StateSamples, z0: float, gravity: float, *, jumps: bool) -> list[Candidate]:
     """Single quintics to rest, for instants so near to rest that rounding spoils what a search finds."""
     half, candidates = np.pi * np.sqrt(z0 / gravity), []
-    for k in range(len(instants)):
+    for k in range(len(samples)):
         for duration in (half * np.geomspace(*SHORT)).tolist():
             times, zero = np.array([0.0, duration]), np.zeros(3)
-            acceleration = zero if jumps else instants.acceleration[k]
-            end = instants.position[k] + _halted(instants.velocity[k], acceleration, duration)
-            values = [instants.position[k], end], [instants.velocity[k], zero], [acceleration, zero]
-            turning = _turning(instants, k, duration, jumps=jumps)
+            acceleration = zero if jumps else samples.acceleration[k]
+            end = samples.position[k] + _halted(samples.velocity[k], acceleration, duration)
+            values = [samples.position[k], end], [samples.velocity[k], zero], [acceleration, zero]
+            turning = _turning(samples, k, duration, jumps=jumps)
             candidates.append(
                 Candidate(k, "free", hermite_spline(times, [np.array(one) for one in values], turning, z0))
             )
@@ -65,26 +65,26 @@ def _halted(rate: np.ndarray, second: np.ndarray, duration: float) -> np.ndarray
     return 0.5 * duration * rate + duration**2 * second / 12.0
 
 
-def _turning(instants: Instants, k: int, duration: float, *, jumps: bool) -> list[np.ndarray] | None:
+def _turning(samples: StateSamples, k: int, duration: float, *, jumps: bool) -> list[np.ndarray] | None:
     # Quaternions (1, v) q0, of any norm, at both ends, with two derivatives.
-    if instants.quaternion is None or instants.angular_velocity is None or instants.angular_acceleration is None:
+    if samples.quaternion is None or samples.angular_velocity is None or samples.angular_acceleration is None:
         return None
-    rate, second = 0.5 * instants.angular_velocity[k], 0.5 * instants.angular_acceleration[k] * (not jumps)
-    zero, start = np.zeros(3), np.repeat(instants.quaternion[[k]], 2, axis=0)
+    rate, second = 0.5 * samples.angular_velocity[k], 0.5 * samples.angular_acceleration[k] * (not jumps)
+    zero, start = np.zeros(3), np.repeat(samples.quaternion[[k]], 2, axis=0)
     values = [zero, _halted(rate, second, duration)], [rate, zero], [second, zero]
     scalars = np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
     pairs = zip(scalars, values, strict=True)
     return [products(np.concatenate([one[:, None], np.array(vectors)], axis=1), start) for one, vectors in pairs]
 
 
-def _poses(instants: Instants, k: int, z0: float, *, jumps: bool) -> FreePoses:
+def _poses(samples: StateSamples, k: int, z0: float, *, jumps: bool) -> FreePoses:
     twice = np.array([k, k])
-    rates, accelerations = instants.rates[twice], instants.accelerations[twice]
+    rates, accelerations = samples.rates[twice], samples.accelerations[twice]
     rates[1] = accelerations[1] = 0.0
     if jumps:
         accelerations[0] = np.nan
-    quaternions = None if instants.quaternion is None else instants.quaternion[twice]
-    return FreePoses(instants.position[twice], quaternions, rates, accelerations, z0, rests_anywhere=True)
+    quaternions = None if samples.quaternion is None else samples.quaternion[twice]
+    return FreePoses(samples.position[twice], quaternions, rates, accelerations, z0, rests_anywhere=True)
 
 
 def _starts(tasks: Tasks, z0: float, *, again: bool) -> Starts:
@@ -98,7 +98,7 @@ def _starts(tasks: Tasks, z0: float, *, again: bool) -> Starts:
 class _Task(NamedTuple):
     # A state in coordinates, the point below the centroid of the spools, half a swing, s, and gravity.
     tau: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     rate: np.ndarray
     second: np.ndarray
     middle: np.ndarray
@@ -108,15 +108,15 @@ class _Task(NamedTuple):
     @classmethod
     def of(cls, tasks: Tasks, k: int, z0: float) -> _Task:
         gravity, along = float(tasks.robot.gravity), coordinates(tasks.robot.pattern)[0]
-        place, middle = tasks.ends[k, 0, 0], tasks.ends[k, 0, 0].copy()
+        position, middle = tasks.ends[k, 0, 0], tasks.ends[k, 0, 0].copy()
         middle[: len(along)] = np.where(along == 2, middle[: len(along)], 0.0)
         second = tasks.turns[k, 0, 0] @ tasks.accelerations[k, 0]
         rate, half = tasks.velocities[k, 0, 0], np.pi * np.sqrt(z0 / gravity)
-        return cls(tasks.basis.averages[:, None], place, rate, second, middle, half, gravity)
+        return cls(tasks.basis.averages[:, None], position, rate, second, middle, half, gravity)
 
     def quintic(self, end: np.ndarray, duration: float) -> np.ndarray:
         """Values at the Greville abscissae of the quintic from the state to rest."""
-        return _quintic(self.tau, self.place, duration * self.rate, 0.5 * duration**2 * self.second, end)
+        return _quintic(self.tau, self.position, duration * self.rate, 0.5 * duration**2 * self.second, end)
 
 
 def _few(task: _Task) -> list[tuple[np.ndarray, float]]:
@@ -124,7 +124,7 @@ def _few(task: _Task) -> list[tuple[np.ndarray, float]]:
     begun = []
     for factor, fraction in zip(BRAKING, CENTRED, strict=True):
         duration = factor * float(np.linalg.norm(task.rate)) / task.gravity + SHORTEST * task.half
-        onward = task.place + ONWARD * duration * task.rate
+        onward = task.position + ONWARD * duration * task.rate
         for end, longer in ((onward, duration), (onward + fraction * (task.middle - onward), 2.0 * duration)):
             begun.append((task.quintic(end, longer), longer))
     return begun
@@ -134,19 +134,19 @@ def _more(task: _Task) -> list[tuple[np.ndarray, float]]:
     # Slower quintics towards the middle, and swings about it that die.
     begun = []
     for duration in (fraction * task.half for fraction in DURATIONS):
-        ends = (task.place + fraction * (task.middle - task.place) for fraction in TOWARDS)
+        ends = (task.position + fraction * (task.middle - task.position) for fraction in TOWARDS)
         begun += [(task.quintic(end, duration), duration) for end in ends]
     for halves in HALVES:
         angle, tau = halves * np.pi * task.tau, task.tau
-        swing = (task.place - task.middle) * np.cos(angle) + task.rate * (task.half / np.pi) * np.sin(angle)
+        swing = (task.position - task.middle) * np.cos(angle) + task.rate * (task.half / np.pi) * np.sin(angle)
         begun.append((task.middle + (1.0 - tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)) * swing, halves * task.half))
     return begun
 
 
 def _quintic(tau: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray, end: np.ndarray) -> np.ndarray:
     # The quintic a + b tau + c tau^2 + ... that rests at its end.
-    gap, slope, bend = end - a - b - c, -(b + 2.0 * c), -2.0 * c
-    x3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
-    x4 = -15.0 * gap + 7.0 * slope - bend
-    x5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
+    gap, derivative, second_derivative = end - a - b - c, -(b + 2.0 * c), -2.0 * c
+    x3 = 10.0 * gap - 4.0 * derivative + 0.5 * second_derivative
+    x4 = -15.0 * gap + 7.0 * derivative - second_derivative
+    x5 = 6.0 * gap - 3.0 * derivative + 0.5 * second_derivative
     return a + b * tau + c * tau**2 + x3 * tau**3 + x4 * tau**4 + x5 * tau**5

@@ -21,7 +21,7 @@ RESTING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class Instants:
+class StateSamples:
     """States of k instants, in the axes of the kernels of a robot.
 
     Fields:
@@ -45,11 +45,11 @@ class Instants:
     def __len__(self) -> int:
         return len(self.times)
 
-    def take(self, rows: np.ndarray) -> Instants:
+    def take(self, rows: np.ndarray) -> StateSamples:
         """Some of the instants."""
         columns: dict[str, Any] = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        taken: dict[str, Any] = {name: None if part is None else part[rows] for name, part in columns.items()}
-        return Instants(**taken)
+        selected: dict[str, Any] = {name: None if part is None else part[rows] for name, part in columns.items()}
+        return StateSamples(**selected)
 
     @property
     def rates(self) -> Float[np.ndarray, "k n"]:
@@ -69,7 +69,7 @@ class Instants:
         slow = np.abs(self.rates).max(1) <= RESTING * np.sqrt(gravity * radius)
         return slow & (np.abs(self.accelerations).max(1) <= RESTING * gravity)
 
-    def moved(self, before: Frame, after: Frame, references: Sequence[np.ndarray]) -> Instants:
+    def moved(self, before: Frame, after: Frame, references: Sequence[np.ndarray]) -> StateSamples:
         """The same states in the axes of another robot with the same file's axes.
 
         `references` has the rotation from a platform's axes in the file to those of the kernels, before and after.
@@ -84,7 +84,7 @@ class Instants:
 
 def instants_of(
     motions: Sequence[Motion], durations: Float[np.ndarray, "n"], times: Float[np.ndarray, "k"]
-) -> Instants:
+) -> StateSamples:
     """States of motions that follow one another."""
     starts = np.concatenate([[0.0], np.cumsum(durations)])
     segment = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(motions) - 1)
@@ -95,7 +95,7 @@ def instants_of(
         parts.append((rows, jax.tree.map(np.asarray, states_at(motions[i], tau))))
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
     columns = dict[str, Any]()
-    for name in (field.name for field in dataclasses.fields(Instants) if field.name != "times"):
+    for name in (field.name for field in dataclasses.fields(StateSamples) if field.name != "times"):
         values = [getattr(state, name) for _, state in parts]
         columns[name] = None if values[0] is None else np.concatenate(values)[order]
-    return Instants(times=np.asarray(times, float), **columns)
+    return StateSamples(times=np.asarray(times, float), **columns)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.machine.sizing import MotorDemands
+from cspr_jax.machine.sizing import MotionDemands
 
 # Columns: name of the field and of its limit, head and unit. The safety factor multiplies the first five.
 COLUMNS = (
@@ -28,17 +28,17 @@ def number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def worst(demands: Iterable[MotorDemands], name: str) -> np.ndarray:
+def worst(demands: Iterable[MotionDemands], name: str) -> np.ndarray:
     """Largest value of each motor; NaN only where there is none."""
     return functools.reduce(np.fmax, [getattr(each, name) for each in demands])
 
 
-def overall(demands: MotorDemands) -> dict[str, float]:
+def overall(demands: MotionDemands) -> dict[str, float]:
     """Largest values of any motor, and energies of all of them."""
     return {name: float((np.sum if name in SUMMED else np.max)(getattr(demands, name))) for name, *_ in COLUMNS}
 
 
-def demands_object(demands: MotorDemands) -> dict[str, Any]:
+def demands_object(demands: MotionDemands) -> dict[str, Any]:
     """Demands on each motor and on all of them."""
     count = len(demands.torque)
     axes = [{"axis": k + 1} | {name: number(getattr(demands, name)[k]) for name, *_ in COLUMNS} for k in range(count)]
@@ -50,7 +50,7 @@ def demands_object(demands: MotorDemands) -> dict[str, Any]:
 
 
 def size_object(
-    robot: str, factor: float, each: Mapping[str, MotorDemands], joint: MotorDemands, limits: Mapping[str, np.ndarray]
+    robot: str, factor: float, each: Mapping[str, MotionDemands], joint: MotionDemands, limits: Mapping[str, np.ndarray]
 ) -> dict[str, Any]:
     """Sizes as plain values."""
     object_of_joint = demands_object(joint)

@@ -40,9 +40,9 @@ class Lines(NamedTuple):
     below: Array
     above: Array
 
-    def least(self, axis: int) -> "Lines":
+    def smallest(self, axis: int) -> "Lines":
         """Lines around the smallest of several functions: above the line between the smallest values at both ends."""
-        # Of several lines above, take the one with the smallest largest value.
+        # Take the line above with the smallest largest value.
         nearest = jnp.argmin(jnp.max(self.above, axis=0, keepdims=True), axis=axis, keepdims=True)
         above = jnp.take_along_axis(self.above, nearest, axis=axis)
         return Lines(jnp.min(self.below, axis=axis), jnp.squeeze(above, axis=axis))
@@ -71,7 +71,7 @@ class MotorBounds(NamedTuple):
         shape = (1,) * (lines.below.ndim - 2) + may_act.shape
         may_act, can_act = may_act.reshape(shape), can_act.reshape(shape)
         below = jnp.min(jnp.where(may_act, lines.below, jnp.inf), axis=-2)
-        certain = Lines(lines.below, jnp.where(can_act, lines.above, jnp.inf)).least(-2).above
+        certain = Lines(lines.below, jnp.where(can_act, lines.above, jnp.inf)).smallest(-2).above
         return Lines(below, jnp.where(can_act.any(-2), certain, jnp.max(lines.above, axis=-2)))
 
 
@@ -98,17 +98,17 @@ def motor_slack(
 ) -> Lines:
     """Lines around the slack of a limit of winches."""
     if quantity == "motor_speed":
-        return _lines(_beside(motors.speed, 1) * -SIGNS[:, None] + limit[None]).least(1)
+        return _lines(_beside(motors.speed, 1) * -SIGNS[:, None] + limit[None]).smallest(1)
     value = torque_bounds(winches, motors, tension)
     if quantity == "motor_power":
         value = value * _beside(motors.speed, 1)
     if quantity == "motor_load":
         value = value * (1.0 / jnp.asarray(winches.stall_torque)[None])
         # Signs of the speed, of the torque, sides, and cables.
-        room = _beside(_room_of_load(winches, limit, motors), 2, at=1)
-        each = room - _beside(_beside(value, 1) * SIGNS[:, None, None], 1)
-        return motors.over_sides(_lines(each).least(1).least(1))
-    return motors.over_sides(_lines(_beside(value, 1) * -SIGNS[:, None, None] + limit[None, None]).least(1))
+        slack = _beside(_room_of_load(winches, limit, motors), 2, at=1)
+        each = slack - _beside(_beside(value, 1) * SIGNS[:, None, None], 1)
+        return motors.over_sides(_lines(each).smallest(1).smallest(1))
+    return motors.over_sides(_lines(_beside(value, 1) * -SIGNS[:, None, None] + limit[None, None]).smallest(1))
 
 
 class TensionLines(NamedTuple):
@@ -123,12 +123,14 @@ class TensionLines(NamedTuple):
         """Tensions with which a limit of winches is kept, too."""
         both = motors.over_sides(_tensions(winches, quantity, limit, motors))
         # The largest of the smallest tensions is minus the least of their negatives.
-        own = Lines(
+        previous = Lines(
             *(jnp.stack(x, axis=1) for x in ((self.high.below, -self.low.above), (self.high.above, -self.low.below)))
         )
-        kept = Lines(*(jnp.stack(x) for x in zip(both, own, strict=True)))
-        kept = Lines(*(jnp.moveaxis(x, 0, 1) for x in kept)).least(1)
-        return TensionLines(Lines(-kept.above[:, 1], -kept.below[:, 1]), Lines(kept.below[:, 0], kept.above[:, 0]))
+        narrower = Lines(*(jnp.stack(x) for x in zip(both, previous, strict=True)))
+        narrower = Lines(*(jnp.moveaxis(x, 0, 1) for x in narrower)).smallest(1)
+        return TensionLines(
+            Lines(-narrower.above[:, 1], -narrower.below[:, 1]), Lines(narrower.below[:, 0], narrower.above[:, 0])
+        )
 
 
 def tension_lines(low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]) -> TensionLines:
@@ -139,18 +141,18 @@ def tension_lines(low: Float[Array, "n_cables"], high: Float[Array, "n_cables"])
 def _tensions(winches: Winches, quantity: str, limit: Array, motors: MotorBounds) -> Lines:
     # Lines around the largest tensions, and around minus the smallest, with which a limit is kept, (2, 2, sides, n).
     gain = _beside(_beside(reciprocal(motors.radius), 1) * winches.efficiency[None] ** SIDES, 1)
-    own = _beside(motors.own_torque, 1) * -SIGNS[:, None, None]
+    own_torque = _beside(motors.own_torque, 1) * -SIGNS[:, None, None]
     if quantity == "motor_load":
-        room = _beside(_room_of_load(winches, limit, motors) * jnp.asarray(winches.stall_torque)[None], 2, at=1)
-        return _lines((room + _beside(own, 1)) * _beside(gain, 1)).least(1)
+        slack = _beside(_room_of_load(winches, limit, motors) * jnp.asarray(winches.stall_torque)[None], 2, at=1)
+        return _lines((slack + _beside(own_torque, 1)) * _beside(gain, 1)).smallest(1)
     if quantity != "motor_power":
-        return _lines((own + limit[None, None]) * gain)
+        return _lines((own_torque + limit[None, None]) * gain)
     # The torque of a power grows without bound towards standstill.
     speed = motors.speed * jnp.where(motors.speed.middle < 0.0, -1.0, 1.0)
     turns = speed.low() > 0.0
     away = selected(turns, speed, constant(jnp.ones_like(limit)))
     slowest = constant(limit / jnp.maximum(motors.speed.magnitude(), STANDSTILL))
-    lines = _lines((_beside(selected(turns, reciprocal(away) * limit, slowest), 2) + own) * gain)
+    lines = _lines((_beside(selected(turns, reciprocal(away) * limit, slowest), 2) + own_torque) * gain)
     return lines._replace(above=jnp.where(turns.reshape(1, 1, 1, -1), lines.above, jnp.inf))
 
 

@@ -1,4 +1,4 @@
-"""Where a robot settles if drums pay out other unstretched lengths than those that hold it in its place."""
+"""A robot settles elsewhere if drums pay out other unstretched lengths than those that hold it in its pose."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def settled(
     stiffness = jnp.asarray(robot.axial_stiffness)
     start = unstretched_lengths(pose_lengths(robot, state), tensions, stiffness)
 
-    def missing(place: State, given: Array) -> tuple[Array, Array]:
-        forces = spring_tensions(stiffness, pose_lengths(robot, place), given)
-        return robot.inertial_wrench(place) - robot.wrench_matrix(place) @ forces, forces
+    def missing(pose: State, lengths: Array) -> tuple[Array, Array]:
+        forces = spring_tensions(stiffness, pose_lengths(robot, pose), lengths)
+        return robot.inertial_wrench(pose) - robot.wrench_matrix(pose) @ forces, forces
 
-    def iterate(place: State, index: Array) -> tuple[State, None]:
-        given = start + (index // ITERATIONS + 1) / STEPS * (unstretched - start)
-        error, forces = missing(place, given)
-        total = stiffness_at(robot, place, forces).total
-        return displaced(robot, place, -solved(total, error[:, None])[0][:, 0]), None
+    def iterate(pose: State, index: Array) -> tuple[State, None]:
+        lengths = start + (index // ITERATIONS + 1) / STEPS * (unstretched - start)
+        error, forces = missing(pose, lengths)
+        total = stiffness_at(robot, pose, forces).total
+        return displaced(robot, pose, -solved(total, error[:, None])[0][:, 0]), None
 
     last, _ = lax.scan(iterate, state, jnp.arange(STEPS * ITERATIONS))
     error, forces = missing(last, unstretched)

@@ -63,8 +63,8 @@ def rest_poses(
 ) -> tuple[State, Float[np.ndarray, "n n_cables"]]:
     """States at rest, and the tensions that hold them; NaN where none do."""
     kernel = partial(_at_rest, robot, Limits(*tension_range(robot, limits)), rule=rule)
-    found: tuple[State, np.ndarray] = in_batches(kernel, (centres, quaternions), batch_size=BATCH)
-    return found
+    answer: tuple[State, np.ndarray] = in_batches(kernel, (centres, quaternions), batch_size=BATCH)
+    return answer
 
 
 def tensions_in(robot: AnyRobot, states: State, limits: Limits, rule: str = CENTRED) -> Float[np.ndarray, "n n_cables"]:
@@ -77,8 +77,8 @@ def stiffnesses(
     robot: AnyRobot, states: State, tensions: Float[np.ndarray, "n n_cables"]
 ) -> tuple[Stiffness, Float[np.ndarray, "n dof 6"]]:
     """Stiffness and mass matrices of a robot in n states, and the twists of their coordinates."""
-    found: tuple[Stiffness, np.ndarray] = in_batches(partial(_in_states, robot), (states, tensions), batch_size=BATCH)
-    return found
+    answer: tuple[Stiffness, np.ndarray] = in_batches(partial(_in_states, robot), (states, tensions), batch_size=BATCH)
+    return answer
 
 
 def modes_of(stiffness: Stiffness, taut: Bool[np.ndarray, "n"]) -> Modes:

@@ -88,8 +88,8 @@ def mass_matrix(robot: AnyRobot, state: State) -> Float[Array, "dof dof"]:
 
     def supplied(accelerations: Array) -> Array:
         twist = accelerations @ directions
-        still = _moving(state, jnp.zeros(6))
-        return robot.inertial_wrench(still._replace(acceleration=twist[:3], angular_acceleration=twist[3:]))
+        static = _moving(state, jnp.zeros(6))
+        return robot.inertial_wrench(static._replace(acceleration=twist[:3], angular_acceleration=twist[3:]))
 
     return jax.jacfwd(supplied)(jnp.zeros(robot.dof))
 

@@ -42,12 +42,12 @@ class Layers:
     """Layers of cable on drums, (n_cables,) each.
 
     Fields:
-        growth: growth of the radius from layer to layer, m.
+        radial_step: growth of the radius from layer to layer, m.
         turns: turns of a layer.
         cable_length: length of the cable from its end on the drum, m: what is not paid out lies on the drum.
     """
 
-    growth: Array
+    radial_step: Array
     turns: Array
     cable_length: Array
 
@@ -94,32 +94,32 @@ def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at
             raise InputError(
                 f"{at}{name}", values[name], f"absent: {did_you_mean(name, names)}keys are {', '.join(names)}"
             )
-    given: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         row.name: value for row in WINCH_NUMBERS if (value := _number(row, values, n_cables, at)) is not None
     }
     for pair in TOGETHER:
-        if len(given.keys() & set(pair)) == 1:
-            missing, other = sorted(pair, key=lambda name: name in given)
+        if len(numbers.keys() & set(pair)) == 1:
+            missing, other = sorted(pair, key=lambda name: name in numbers)
             raise InputError(f"{at}{missing}", None, f"given beside {other}", problem="missing")
-    turns, length = given.pop("layer_turns", None), given.pop("cable_length", None)
+    turns, length = numbers.pop("layer_turns", None), numbers.pop("cable_length", None)
     layers = None
     if turns is not None and length is not None:
         if not cable_diameter:
             raise InputError("cable_diameter", cable_diameter, f"a number > 0 beside {at}layer_turns, in m")
-        growth = as_float64(np.broadcast_to(np.asarray(cable_diameter, float), (n_cables,)))
-        layers = Layers(growth, turns, length)
-    line: dict[str, Any] = {name: given.pop(f"motor_{name}", None) for name in ("stall_torque", "no_load_speed")}
-    return Winches(**given, **line, layers=layers)
+        radial_step = as_float64(np.broadcast_to(np.asarray(cable_diameter, float), (n_cables,)))
+        layers = Layers(radial_step, turns, length)
+    line: dict[str, Any] = {name: numbers.pop(f"motor_{name}", None) for name in ("stall_torque", "no_load_speed")}
+    return Winches(**numbers, **line, layers=layers)
 
 
 def winch_limits(values: Mapping[str, Any], n_cables: int, at: str = "") -> dict[str, Array]:
     """Limits of winches among their numbers, checked; the load is at most 1 where the motor has a line."""
-    given = {row.name: value for row in WINCH_LIMITS if (value := _number(row, values, n_cables, at)) is not None}
+    numbers = {row.name: value for row in WINCH_LIMITS if (value := _number(row, values, n_cables, at)) is not None}
     if values.get(LINE) is not None:
-        return {LOAD: as_float64(np.ones(n_cables))} | given
-    if LOAD in given:
+        return {LOAD: as_float64(np.ones(n_cables))} | numbers
+    if LOAD in numbers:
         raise InputError(f"{at}{LINE}", None, f"given beside {LOAD}", problem="missing")
-    return given
+    return numbers
 
 
 def winch_table(winches: Winches, limits: Limits) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def radii(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
     """Radii of the drums where the cables leave them."""
     if winches.layers is None:
         return jnp.broadcast_to(winches.drum_radius, lengths.shape)
-    return winches.drum_radius + winches.layers.growth * _full_layers(winches, winches.layers, lengths)
+    return winches.drum_radius + winches.layers.radial_step * _full_layers(winches, winches.layers, lengths)
 
 
 def largest_radii(winches: Winches) -> Float[Array, "n"]:
@@ -180,7 +180,9 @@ def drum_angles(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n
     """Angles by which drums have paid out since `zero_length`, rad."""
     if winches.layers is None:
         return (lengths - winches.zero_length) / winches.drum_radius
-    return _turned(winches, winches.layers, winches.zero_length) - _turned(winches, winches.layers, lengths)
+    return _rotation_angle(winches, winches.layers, winches.zero_length) - _rotation_angle(
+        winches, winches.layers, lengths
+    )
 
 
 def motor_angles(winches: Winches, lengths: Float[Array, "n"]) -> Float[Array, "n"]:
@@ -193,18 +195,18 @@ def cable_lengths(winches: Winches, angles: Float[Array, "n"]) -> Float[Array, "
     paid_out = angles / (winches.direction * winches.gear_ratio)
     if winches.layers is None:
         return winches.zero_length + winches.drum_radius * paid_out
-    layers, angle = winches.layers, _turned(winches, winches.layers, winches.zero_length) - paid_out
+    layers, angle = winches.layers, _rotation_angle(winches, winches.layers, winches.zero_length) - paid_out
     full = jnp.maximum(jnp.floor(angle / (2.0 * jnp.pi * layers.turns)), 0.0)
-    rest = (angle - 2.0 * jnp.pi * layers.turns * full) * (winches.drum_radius + layers.growth * full)
+    rest = (angle - 2.0 * jnp.pi * layers.turns * full) * (winches.drum_radius + layers.radial_step * full)
     return layers.cable_length - _wound(winches, layers, full) - rest
 
 
 def layer_ends(winches: Winches, layers: Layers) -> Float[np.ndarray, "k n"]:
     """Lengths at which layers are full, from the empty drum to the cable's end, in descending order."""
-    growth, radius, total = (np.asarray(x) for x in (layers.growth, winches.drum_radius, layers.cable_length))
-    turn, first = 2.0 * np.pi * np.asarray(layers.turns), radius - 0.5 * growth
-    most = np.ceil((np.sqrt(first**2 + 2.0 * growth * total / turn) - first) / growth).max()
-    return total - np.asarray(_wound(winches, layers, np.arange(most + 2.0)[:, None]))
+    radial_step, radius, total = (np.asarray(x) for x in (layers.radial_step, winches.drum_radius, layers.cable_length))
+    turn, first = 2.0 * np.pi * np.asarray(layers.turns), radius - 0.5 * radial_step
+    largest = np.ceil((np.sqrt(first**2 + 2.0 * radial_step * total / turn) - first) / radial_step).max()
+    return total - np.asarray(_wound(winches, layers, np.arange(largest + 2.0)[:, None]))
 
 
 def torques(
@@ -237,7 +239,7 @@ def motor_states(
 
 
 class MotorDemands(NamedTuple):
-    """What motions ask of the motors, (n_cables,) magnitudes each; at standstill of the worse direction of friction.
+    """Motions ask these magnitudes of the motors, (n_cables,) each; at standstill of the worse direction of friction.
 
     Fields:
         motor_speed: rad/s.
@@ -290,32 +292,32 @@ def tensions_within(
         largest.append(left * jnp.asarray(winches.stall_torque))
     for side in (1.0, -1.0):
         sides, occurs = jnp.full_like(speed, side), side * speed >= -STANDSTILL
-        own = torques(winches, radius, speed, acceleration, jnp.zeros_like(speed), sides)
+        own_torque = torques(winches, radius, speed, acceleration, jnp.zeros_like(speed), sides)
         gain = winches.gear_ratio * winches.efficiency**sides / radius
         for torque in largest:
-            low = jnp.where(occurs, jnp.maximum(low, (-torque - own) * gain), low)
-            high = jnp.where(occurs, jnp.minimum(high, (torque - own) * gain), high)
+            low = jnp.where(occurs, jnp.maximum(low, (-torque - own_torque) * gain), low)
+            high = jnp.where(occurs, jnp.minimum(high, (torque - own_torque) * gain), high)
     return low, high
 
 
 def _wound(winches: Winches, layers: Layers, full: Any) -> Any:
     # Length of the cable in `full` layers, m.
-    return 2.0 * jnp.pi * layers.turns * full * (winches.drum_radius + 0.5 * layers.growth * (full - 1.0))
+    return 2.0 * jnp.pi * layers.turns * full * (winches.drum_radius + 0.5 * layers.radial_step * (full - 1.0))
 
 
 def _full_layers(winches: Winches, layers: Layers, lengths: Array) -> Array:
     # Largest whole number whose layers are not longer than what lies on the drum: the root of a quadratic.
     turns = jnp.maximum(layers.cable_length - lengths, 0.0) / (2.0 * jnp.pi * layers.turns)
-    first = winches.drum_radius - 0.5 * layers.growth
-    root = jnp.floor(2.0 * turns / (first + jnp.sqrt(first**2 + 2.0 * layers.growth * turns)))
+    first = winches.drum_radius - 0.5 * layers.radial_step
+    root = jnp.floor(2.0 * turns / (first + jnp.sqrt(first**2 + 2.0 * layers.radial_step * turns)))
     # Rounding may put a length at the end of a layer into the wrong one.
     beyond = _wound(winches, layers, root + 1.0) <= layers.cable_length - lengths
     short = _wound(winches, layers, root) > jnp.maximum(layers.cable_length - lengths, 0.0)
     return root + jnp.where(beyond, 1.0, 0.0) - jnp.where(short, 1.0, 0.0)
 
 
-def _turned(winches: Winches, layers: Layers, lengths: Array) -> Array:
+def _rotation_angle(winches: Winches, layers: Layers, lengths: Array) -> Array:
     # Angle of the drum since it was empty, rad.
     full = _full_layers(winches, layers, lengths)
     rest = layers.cable_length - lengths - _wound(winches, layers, full)
-    return 2.0 * jnp.pi * layers.turns * full + rest / (winches.drum_radius + layers.growth * full)
+    return 2.0 * jnp.pi * layers.turns * full + rest / (winches.drum_radius + layers.radial_step * full)

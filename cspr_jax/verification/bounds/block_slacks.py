@@ -35,7 +35,7 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.verification.criteria import ALL, AT_TIMES, Parts, bounds_tensions, criteria, pose_conditions
+from cspr_jax.verification.criteria import ALL, AT_TIMES, CriterionParts, bounds_tensions, criteria, pose_conditions
 
 # Numbers of blocks that are bounded together, with contacts and without.
 BATCH = 64
@@ -94,7 +94,7 @@ def _kernel(
     bodies: Bodies,
     states: StateBounds,
     passes: bool = False,
-    kinds: Parts = ALL,
+    kinds: CriterionParts = ALL,
 ) -> tuple[Array, ...] | Array:
     # Bound the slacks, or tell which of them are proved to vanish at a single time.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
@@ -149,7 +149,7 @@ def _of_rates(
     limits: Limits,
     state: StateBounds,
     balance: tuple[CableBounds, AffineBounds, AffineBounds],
-    kinds: Parts,
+    kinds: CriterionParts,
 ) -> list[Part]:
     # Bound the slacks of tensions and limits, those of winches last.
     parts, (cables, matrix, wrench) = list[Part](), balance
@@ -252,7 +252,7 @@ def block_slacks(
     start: Float[np.ndarray, "k"],
     end: Float[np.ndarray, "k"],
     scene: Scene | None = None,
-    parts: Parts = ALL,
+    parts: CriterionParts = ALL,
 ) -> BlockSlacks:
     """Bounds of the slacks of a motion over blocks of time."""
     bodies = bodies_of(robot, scene or default_scene(robot))
