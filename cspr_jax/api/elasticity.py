@@ -104,20 +104,20 @@ def stiffness(
             of a point mass, or an unknown rule.
     """
     with double_precision():
-        found = _found(robot, positions, quaternions, tensions, rule, point)
-        signs = _signs(found.robot, found.frame)
+        matrices = _matrices(robot, positions, quaternions, tensions, rule, point)
+        signs = _signs(matrices.robot, matrices.frame)
         both = signs[:, None] * signs
-        parts = {name: getattr(found.stiffness, name) * both[None] for name in ("elastic", "geometric", "mass")}
-        slack = ~are_taut(found.tensions)
+        parts = {name: getattr(matrices.stiffness, name) * both[None] for name in ("elastic", "geometric", "mass")}
+        slack = ~are_taut(matrices.tensions)
         for name in ("elastic", "geometric"):
             parts[name][slack] = np.nan
-        stretched, forces = found.stiffness.lengths, as_float64(found.tensions)
-        unstretched = np.asarray(unstretched_lengths(stretched, forces, found.robot.axial_stiffness))
-    directions = signs[None, :, None] * found.twists * np.tile(found.frame.signs, 2)
+        stretched, forces = matrices.stiffness.lengths, as_float64(matrices.tensions)
+        unstretched = np.asarray(unstretched_lengths(stretched, forces, matrices.robot.axial_stiffness))
+    directions = signs[None, :, None] * matrices.twists * np.tile(matrices.frame.signs, 2)
     unstretched = np.where(slack[:, None], np.nan, unstretched)
     total = parts["elastic"] + parts["geometric"]
     return RobotStiffness(
-        matrix=total, twists=directions, tensions=found.tensions, unstretched_lengths=unstretched, **parts
+        matrix=total, twists=directions, tensions=matrices.tensions, unstretched_lengths=unstretched, **parts
     )
 
 
@@ -148,13 +148,13 @@ def natural_frequencies(
         InputError: as for `stiffness`.
     """
     with double_precision():
-        found = _found(robot, positions, quaternions, tensions, rule, point)
-        modes: Modes = modes_of(found.stiffness, are_taut(found.tensions))
-    shapes = np.einsum("nmc,ncj->nmj", modes.shapes, found.twists) * np.tile(found.frame.signs, 2)
-    return NaturalFrequencies(modes.frequencies, modes.squares, shapes[..., :3], shapes[..., 3:], found.tensions)
+        matrices = _matrices(robot, positions, quaternions, tensions, rule, point)
+        modes: Modes = modes_of(matrices.stiffness, are_taut(matrices.tensions))
+    shapes = np.einsum("nmc,ncj->nmj", modes.shapes, matrices.twists) * np.tile(matrices.frame.signs, 2)
+    return NaturalFrequencies(modes.frequencies, modes.squares, shapes[..., :3], shapes[..., 3:], matrices.tensions)
 
 
-class _Found(NamedTuple):
+class _Matrices(NamedTuple):
     # Matrices in the kernels' axes.
     robot: AnyRobot
     frame: Frame
@@ -163,7 +163,7 @@ class _Found(NamedTuple):
     tensions: np.ndarray
 
 
-def _found(robot, positions, quaternions, tensions, rule: str, point: str | None) -> _Found:
+def _matrices(robot, positions, quaternions, tensions, rule: str, point: str | None) -> _Matrices:
     check_kind(robot)
     if robot.axial_stiffness is None:
         raise InputError(
@@ -180,11 +180,11 @@ def _found(robot, positions, quaternions, tensions, rule: str, point: str | None
     centres, turns = kernel_poses(inner, frame, points, quaternions, point or "origin", "quaternions")
     turns = np.tile(IDENTITY, (len(points), 1)) if turns is None else turns
     states, at_rest = rest_poses(inner, centres, turns, robot.limits, rule)
-    chosen = at_rest if tensions is None else _given(tensions, at_rest.shape)
-    return _Found(inner, frame, *stiffnesses(inner, states, chosen), chosen)
+    chosen = at_rest if tensions is None else _checked_tensions(tensions, at_rest.shape)
+    return _Matrices(inner, frame, *stiffnesses(inner, states, chosen), chosen)
 
 
-def _given(tensions, shape: tuple[int, ...]) -> np.ndarray:
+def _checked_tensions(tensions, shape: tuple[int, ...]) -> np.ndarray:
     values = np.asarray(tensions, float)
     if values.shape not in ((), shape[1:], shape):
         raise InputError("tensions", f"shape {values.shape}", f"numbers > 0 of shape (), {shape[1:]} or {shape}, N")

@@ -42,7 +42,7 @@ class ForwardKinematics:
         positions: (n, 3) positions of `point`, or of the joint, in the robot's axes, m: the solution that is meant, or
             where there is none the nearest pose that was found.
         quaternions: (n, 4) unit quaternions, scalar first; of a point mass (1, 0, 0, 0).
-        found: (n,) whether the pose has these lengths, within the tolerance.
+        is_found: (n,) whether the pose has these lengths, within the tolerance.
         residuals: (n, n_cables) lengths of the cables in the pose minus given ones, m.
         steps: (n,) number of steps of Gauss-Newton; 0 where the pose has a closed form.
         count: (n,) number of solutions that were found, of those that were asked for.
@@ -55,7 +55,7 @@ class ForwardKinematics:
 
     positions: np.ndarray
     quaternions: np.ndarray
-    found: np.ndarray
+    is_found: np.ndarray
     residuals: np.ndarray
     steps: np.ndarray
     count: np.ndarray
@@ -152,32 +152,36 @@ def forward(  # noqa: PLR0913
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
     row = PATTERNS[robot.pattern]
     with double_precision():
-        given = checked_lengths(robot, lengths, is_angle=angles)
+        cable_lengths = checked_lengths(robot, lengths, is_angle=angles)
         inner_robot, frame = centred(robot)
         if robot.n_cables < robot.dof:
             raise InputError("robot", robot.n_cables, f"{robot.dof} cables or more, as many as degrees of freedom")
         loads = _weights(weights, robot)
-        starts = _starts(inner_robot, frame, start, start_orientations, len(given), point or "origin")
+        starts = _starts(inner_robot, frame, start, start_orientations, len(cable_lengths), point or "origin")
         fixed = np.asarray(frame.inward(np.zeros(3))) if starts is None else starts[0][0]
         search = Search(inner_robot, loads, tolerance, np.where(np.isin(range(3), row.forces), 0.0, fixed))
         if row.is_jointed and start_orientations is None:  # the joint alone is no start
             starts = None
         if equilibrium:
-            rest = equilibria(search, given, starts)
-            found = _answers(inner_robot, frame, rest.poses, point or "origin", is_all=all_solutions)
+            rest = equilibria(search, cable_lengths, starts)
+            answers = _answers(inner_robot, frame, rest.poses, point or "origin", is_all=all_solutions)
             is_slack = rest.poses.residuals[:, 0] < -TAUT * search.size
-            return dataclasses.replace(found, slack=is_slack, tensions=rest.tensions[:, 0])
-        poses = _poses(search, given, starts, is_all=all_solutions)
+            return dataclasses.replace(answers, slack=is_slack, tensions=rest.tensions[:, 0])
+        poses = _poses(search, cable_lengths, starts, is_all=all_solutions)
         return _answers(inner_robot, frame, poses, point or "origin", is_all=all_solutions)
 
 
 def _poses(
-    search: Search, given: np.ndarray, starts: tuple[np.ndarray, np.ndarray] | None, *, is_all: bool
+    search: Search, cable_lengths: np.ndarray, starts: tuple[np.ndarray, np.ndarray] | None, *, is_all: bool
 ) -> SolvedPoses:
     is_every = is_all or search.is_closed
     if starts is None:
-        return search.all_solutions(given) if is_every else search.usual(given)
-    return search.nearest_first(search.all_solutions(given), *starts) if is_every else search.near(given, *starts)
+        return search.all_solutions(cable_lengths) if is_every else search.usual(cable_lengths)
+    return (
+        search.nearest_first(search.all_solutions(cable_lengths), *starts)
+        if is_every
+        else search.near(cable_lengths, *starts)
+    )
 
 
 def _weights(weights: Any, robot: Any) -> np.ndarray:
@@ -207,21 +211,21 @@ def _starts(
     if orientations is not None:
         if not row.is_body:
             raise InputError("start_orientations", None, "must be None", problem="a point mass has none")
-        given = np.atleast_2d(np.asarray(orientations, float))
-        if len(given) not in (1, count):
+        values = np.atleast_2d(np.asarray(orientations, float))
+        if len(values) not in (1, count):
             raise InputError("start_orientations", f"shape {np.shape(orientations)}", f"(4,) or ({count}, 4)")
-        turns = np.asarray(frame.rotated_quaternions(quaternions("start_orientations", given, len(given))))
+        turns = np.asarray(frame.rotated_quaternions(quaternions("start_orientations", values, len(values))))
         if row.is_planar and turns[:, [1, 3]].any():
             raise InputError("start_orientations", "not about y", "turns about y: those of a planar robot")
     inner = np.broadcast_to(np.asarray(frame.inward(points)), (count, 3)).copy()
-    turned = np.broadcast_to(turns, (count, 4)).copy()
-    return (mass_centres(robot, inner, turned) if point == "origin" else inner), turned
+    rotations = np.broadcast_to(turns, (count, 4)).copy()
+    return (mass_centres(robot, inner, rotations) if point == "origin" else inner), rotations
 
 
 def _answers(robot: Any, frame: Frame, poses: SolvedPoses, point: str, *, is_all: bool) -> ForwardKinematics:
     # In the axes of the robot's file; positions are of the origin of the platform's axes, or of the mass centre.
-    is_body, kept = PATTERNS[robot.pattern].is_body, slice(None if is_all else 1)
-    inner, turns = poses.positions[:, kept], poses.quaternions[:, kept]
+    is_body, columns = PATTERNS[robot.pattern].is_body, slice(None if is_all else 1)
+    inner, turns = poses.positions[:, columns], poses.quaternions[:, columns]
     outer, orientations = inner, turns
     if is_body:
         turns = np.where(turns[..., :1] < 0.0, -turns, turns)

@@ -48,7 +48,7 @@ SHOWN = ("motor_torque_max", "motor_speed_max", "motor_power_max", "motor_torque
 
 @dataclasses.dataclass(frozen=True)
 class Sizes:
-    """What motions ask of the motors of a robot, and the smallest motors that do it.
+    """Peaks of the motors of a robot along motions, and the smallest motors that reach them.
 
     Fields:
         robot: name of the robot.
@@ -150,14 +150,14 @@ def size(given: PlansOrResults, *, factor: Positive = FACTOR) -> Sizes:
     if not sources:
         raise ConfigError("given", "[]: must be one plan or result, or more")
     with double_precision():
-        found = [_source(one, k) for k, one in enumerate(sources)]
-        first = found[0]
-        for other in found[1:]:
+        items = [_source(one, k) for k, one in enumerate(sources)]
+        first = items[0]
+        for other in items[1:]:
             if other.robot_file.winch != first.robot_file.winch:
                 raise ConfigError(other.name, f"must have the winches of {first.name}: sizes are of one machine")
-        names = [_unique(source.name, [other.name for other in found[:k]]) for k, source in enumerate(found)]
-        each = {name: source.demands() for name, source in zip(names, found, strict=True)}
-        curves = {n: source.curves() for n, source in zip(names, found, strict=True) if isinstance(source, _Motions)}
+        names = [_unique(source.name, [other.name for other in items[:k]]) for k, source in enumerate(items)]
+        each = {name: source.peaks() for name, source in zip(names, items, strict=True)}
+        curves = {n: source.curves() for n, source in zip(names, items, strict=True) if isinstance(source, _Motions)}
         limits = _limits(first.robot, first.limits)
     return Sizes(first.robot_file.name, float(factor), each, joint_cycle(list(each.values())), limits, curves)
 
@@ -184,7 +184,7 @@ class _Motions:
     def _motions(self) -> list[Motion]:
         return [motion for leg in self.plan.legs for motion in leg.motions]
 
-    def demands(self) -> MotionDemands:
+    def peaks(self) -> MotionDemands:
         samples = self.plan.demands.samples.tolist()
         return motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
 
@@ -194,7 +194,7 @@ class _Motions:
 
 
 @dataclasses.dataclass(frozen=True)
-class _Poses:
+class _StaticPoses:
     # Poses at rest inside of a workspace.
     name: str
     robot_file: RobotFile
@@ -203,22 +203,22 @@ class _Poses:
     positions: np.ndarray
     quaternions: np.ndarray
 
-    def demands(self) -> MotionDemands:
+    def peaks(self) -> MotionDemands:
         return holding_demands(self.robot, self.limits, self.positions, self.quaternions)
 
 
-def _source(given: Any, k: int) -> _Motions | _Poses:
-    if hasattr(given, "axes"):
-        return _workspace(given, f"result {k + 1}")
-    if isinstance(given, str | Path) and Path(given).suffix != ".toml":
+def _source(item: Any, k: int) -> _Motions | _StaticPoses:
+    if hasattr(item, "axes"):
+        return _workspace(item, f"result {k + 1}")
+    if isinstance(item, str | Path) and Path(item).suffix != ".toml":
         from cspr_jax.store.reading.result import open_result  # plans load no results
 
-        return _workspace(open_result(result_at(Path(given))), str(given))
-    if isinstance(given, Plan | Check):
-        planned = given.plan if isinstance(given, Check) else given
+        return _workspace(open_result(result_at(Path(item))), str(item))
+    if isinstance(item, Plan | Check):
+        planned = item.plan if isinstance(item, Check) else item
         name = str(planned.keys.motion or f"motion {k + 1}")
     else:
-        planned, name = plan(given), f"plan {k + 1}" if isinstance(given, Mapping) else str(given)
+        planned, name = plan(item), f"plan {k + 1}" if isinstance(item, Mapping) else str(item)
     _check_winches(planned.robot_file, name)
     if not np.isfinite(planned.answers.duration).all():
         raise ConfigError(name, "must have a motion in every segment; see its verdict")
@@ -234,7 +234,7 @@ def _check_winches(robot_file: RobotFile, name: str) -> None:
         raise ConfigError(name, f"robot {robot_file.name}: must have [winch]: motors are sized for its drums")
 
 
-def _workspace(result: Result, name: str) -> _Poses:
+def _workspace(result: Result, name: str) -> _StaticPoses:
     settings = {key: value for key, value in result.settings.items() if key != "dimensions"}
     if settings.get("map") != "workspace":
         kind = f'a map "{settings["map"]}"' if settings else "a motion"
@@ -250,12 +250,12 @@ def _workspace(result: Result, name: str) -> _Poses:
         raise ConfigError(name, "must have cells inside of the workspace: there is nothing to hold")
     cells = {axis: points[index] for (axis, points), index in zip(result.axes.items(), inside, strict=True)}
     robot, limits, positions, quaternions = WorkspaceMap(robot_file, spec, Path(name)).at_rest(cells)
-    return _Poses(name, robot_file, robot, limits, positions, quaternions)
+    return _StaticPoses(name, robot_file, robot, limits, positions, quaternions)
 
 
 def _limits(robot: AnyRobot, limits: Limits) -> dict[str, np.ndarray]:
-    found = {name: getattr(limits, name, None) for name in SHOWN}
-    shown = {name: np.asarray(value) for name, value in found.items() if value is not None}
+    values = {name: getattr(limits, name, None) for name in SHOWN}
+    shown = {name: np.asarray(value) for name, value in values.items() if value is not None}
     winches = robot.winches
     if winches is not None and winches.stall_torque is not None and winches.no_load_speed is not None:
         shown["line"] = np.stack([np.asarray(winches.stall_torque), np.asarray(winches.no_load_speed)])

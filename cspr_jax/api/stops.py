@@ -36,7 +36,7 @@ from cspr_jax.outputs.plots.motions.stops import stops_figure
 from cspr_jax.outputs.plots.style.style import style_of
 from cspr_jax.robots.model.patterns import PATTERNS
 
-INSTANTS = 50
+USUAL_COUNT = 50
 LARGEST_INSTANTS = 10_000
 InstantCount = Annotated[int, Integer(1, LARGEST_INSTANTS)]
 
@@ -83,7 +83,7 @@ class Stops(stop_report.StopsAlong):
 def stops(
     given: PlanOrFile,
     *,
-    instants: InstantCount = INSTANTS,
+    instants: InstantCount = USUAL_COUNT,
     times: Times | None = None,
     without: Cables | None = None,
 ) -> Stops:
@@ -123,8 +123,10 @@ def stops(
         sequence = ConsecutiveMotions(
             motions, planned.answers.duration, planned.frame, _reference(planned.robot_file, planned)
         )
-        found = fastest_stops(emergency, sequence, at)
-        rows = [_planned_stop(time, stop, emergency, sequence) for time, stop in zip(at.tolist(), found, strict=True)]
+        solutions = fastest_stops(emergency, sequence, at)
+        rows = [
+            _planned_stop(time, stop, emergency, sequence) for time, stop in zip(at.tolist(), solutions, strict=True)
+        ]
     return Stops(planned, tuple(rows), gone)
 
 
@@ -139,25 +141,25 @@ def _check(planned: Plan) -> None:
         raise ConfigError(NAME, "uncertainty: must be absent in a plan that is to be stopped: stops are proved without")
 
 
-def _left(planned: Plan, gone: tuple[int, ...], given: list[int]) -> tuple[RobotFile, str]:
+def _left(planned: Plan, gone: tuple[int, ...], broken: list[int]) -> tuple[RobotFile, str]:
     # The robot without the cables that break, and what is left where there are too few, or none that can be used.
     if not gone:
         return planned.robot_file, ""
     before = planned.robot_file.missing_cables
-    whole = planned.robot_file.whole
-    count, both = len(whole.base_points), [*before, *given]
-    if len(set(both)) == len(both) and max(both) < count and count - len(both) < PATTERNS[whole.own_pattern].dof:
-        return whole, f"{too_few(whole, count - len(both))}; {stop_report.NONE}"
-    return without_cables(whole, both, NAME), ""
+    full = planned.robot_file.full
+    count, both = len(full.base_points), [*before, *broken]
+    if len(set(both)) == len(both) and max(both) < count and count - len(both) < PATTERNS[full.own_pattern].dof:
+        return full, f"{too_few(full, count - len(both))}; {stop_report.NONE}"
+    return without_cables(full, both, NAME), ""
 
 
 def _emergency(planned: Plan, robot_file: RobotFile, *, jumps: bool) -> Emergency:
-    keys, frame = planned.keys, planned.frame
+    spec, frame = planned.keys, planned.frame
     problem: Problem = planned.problem
     if jumps:
         frame = frame_of(robot_file.base_points, robot_file.z_axis)
-        problem = build_problem(robot_file, keys, keys, NAME, epsilon=0.2, any_cables=True, pulleys=True)
-    scene = scene_of(problem.robot, robot_file, frame, keys, NAME, trajectory=keys)
+        problem = build_problem(robot_file, spec, spec, NAME, epsilon=0.2, any_cables=True, pulleys=True)
+    scene = scene_of(problem.robot, robot_file, frame, spec, NAME, trajectory=spec)
     return Emergency(problem, scene, frame, _reference(robot_file, planned), _depth(planned, frame), jumps)
 
 
@@ -190,9 +192,9 @@ def _planned_stop(
     quaternion = end.quaternion
     if quaternion is not None:
         # Orientations are relative to the reference orientation of the robot that the plan moves.
-        own = emergency.frame.rotated_quaternions(quaternion)[None]
+        relative = emergency.frame.rotated_quaternions(quaternion)[None]
         between = products(emergency.reference[None], (sequence.reference * BACK)[None])
-        quaternion = emergency.frame.rotated_quaternions(products(own, between)[0])
+        quaternion = emergency.frame.rotated_quaternions(products(relative, between)[0])
     return stop_report.PlannedStop(
         time, stop.kind, stop.duration, end.position, quaternion, stop.proof.margin_bound, motion
     )

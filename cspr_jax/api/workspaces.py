@@ -128,8 +128,8 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be given for each cable
         allowed = f"a number > 0, or {robot.n_cables}: one a cable"
         tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
-    given = Limits(tension_min=tension_min, tension_max=tension_max)
-    return static_limits(robot, limits_over(robot, given, any_tensions=True, motors=True))
+    bounds = Limits(tension_min=tension_min, tension_max=tension_max)
+    return static_limits(robot, limits_over(robot, bounds, any_tensions=True, motors=True))
 
 
 def kernel_poses(

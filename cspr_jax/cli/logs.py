@@ -55,8 +55,8 @@ def numbers_of(option: str, text: str, counts: tuple[int, ...] = ()) -> list[flo
 
 
 def _locate(options: argparse.Namespace) -> int:
-    given = {"--lengths": options.lengths, "--angles": options.angles, "a file": options.file}
-    named = [name for name, value in given.items() if value is not None]
+    sources = {"--lengths": options.lengths, "--angles": options.angles, "a file": options.file}
+    named = [name for name, value in sources.items() if value is not None]
     if len(named) != 1:
         words = "given" if len(named) > 1 else "missing"
         raise ConfigError(" and ".join(named) or "--lengths", f"{words}: one of a file, --lengths and --angles")
@@ -86,7 +86,7 @@ def _locate(options: argparse.Namespace) -> int:
         for line in poses.lines():
             print_line(line)
         print_table(poses.to_table())
-    return ExitCode.DONE if poses.found.all() else ExitCode.NOT_FEASIBLE
+    return ExitCode.DONE if poses.is_found.all() else ExitCode.NOT_FEASIBLE
 
 
 def _add_log(parser: argparse.ArgumentParser) -> None:

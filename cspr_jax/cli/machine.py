@@ -44,7 +44,7 @@ def _add_size(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
 
 
-def _size(options: argparse.Namespace) -> int:
+def _print_sizes(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     if not 0.0 < options.factor < float("inf"):
@@ -104,6 +104,6 @@ def _anchors(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _size),
+    Command("size", "find the smallest motors that do plans or hold poses of a workspace", _add_size, _print_sizes),
     Command("anchors", "print anchors and drums as the firmware of a controller reads them", _add_anchors, _anchors),
 )

@@ -66,13 +66,13 @@ def _simulate(options: argparse.Namespace) -> int:
         if not (planned.feasible or options.anyway):
             warn(f"{options.plan}: not driven, since a segment is not proved feasible (--anyway drives it)")
             return ExitCode.NOT_FEASIBLE
-        found = simulate(planned, anyway=True, **settings)
+        simulation = simulate(planned, anyway=True, **settings)
         if options.output is not None:
-            found.plot(output=options.output, **style)
+            simulation.plot(output=options.output, **style)
     if options.json:
-        print_json(found.to_dict())
+        print_json(simulation.to_dict())
     else:
-        for line in found.lines():
+        for line in simulation.lines():
             print_line(line)
     return ExitCode.DONE if planned.feasible else ExitCode.NOT_FEASIBLE
 

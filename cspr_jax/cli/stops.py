@@ -37,7 +37,7 @@ def _add_stops(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
 
 
-def _stops(options: argparse.Namespace) -> int:
+def _print_stops(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     if not 1 <= options.instants <= LARGEST_INSTANTS:
@@ -58,16 +58,16 @@ def _stops(options: argparse.Namespace) -> int:
         if not plan.feasible:
             warn(f"{options.plan}: not stopped, since a segment is not proved feasible")
             return ExitCode.NOT_FEASIBLE
-        found = stops(plan, instants=options.instants, without=options.without)
+        answer = stops(plan, instants=options.instants, without=options.without)
         if options.output is not None:
-            found.plot(output=options.output, **style)
+            answer.plot(output=options.output, **style)
     if options.json:
-        print_json(found.to_dict())
+        print_json(answer.to_dict())
     else:
-        print_table(found.to_table())
-    return ExitCode.DONE if found.all_found else ExitCode.NOT_FEASIBLE
+        print_table(answer.to_table())
+    return ExitCode.DONE if answer.all_found else ExitCode.NOT_FEASIBLE
 
 
 COMMANDS = (
-    Command("stops", "find proved stops from the instants of a plan, also when cables break", _add_stops, _stops),
+    Command("stops", "find proved stops from the instants of a plan, also when cables break", _add_stops, _print_stops),
 )

@@ -60,7 +60,7 @@ def read_cable_log(path: Path, n_cables: int | None = None, *, needs_times: bool
     if len(rows) - 1 > LARGEST_ROWS:
         raise ConfigError(path, f"{len(rows) - 1} rows: must be at most {LARGEST_ROWS}")
     (head_line, head), *body = rows
-    delimiter = next((mark for mark in (";", "\t") if mark in head), ",")
+    delimiter = next((separator for separator in (";", "\t") if separator in head), ",")
     heads = [cell.strip().strip('"') for cell in head.split(delimiter)]
     columns, factors = _columns(path, head_line, heads)
     table = _numbers(path, body, heads, columns, delimiter)
@@ -152,12 +152,12 @@ def _groups(
     if needs_times and not numbers["t"]:
         raise ConfigError(path, f"line {line}: no column t: must have {_WORDS}")
     for name in ("length", "angle", "tension"):
-        found = numbers[name]
+        indices = numbers[name]
         count = n_cables or len(numbers["length"] or numbers["angle"])
-        if found and found != list(range(1, count + 1)):
-            which = ", ".join(f"{name}_{n}" for n in found)
-            raise ConfigError(path, f"line {line}: columns {which}: must be {name}_1 to {name}_{count}, one a cable")
-    return {name: [columns[name, n] for n in found] for name, found in numbers.items() if found}
+        if indices and indices != list(range(1, count + 1)):
+            heads = ", ".join(f"{name}_{n}" for n in indices)
+            raise ConfigError(path, f"line {line}: columns {heads}: must be {name}_1 to {name}_{count}, one a cable")
+    return {name: [columns[name, n] for n in indices] for name, indices in numbers.items() if indices}
 
 
 def _check_times(path: Path, times: np.ndarray, lines: np.ndarray) -> None:

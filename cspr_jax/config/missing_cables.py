@@ -36,19 +36,19 @@ def without_cables(robot_file: RobotFile, cables: Sequence[int] | str | None, fi
     if len(missing) < len(cables) or missing[0] < 0 or missing[-1] >= count:
         allowed = f"cables of {robot_file.name}, from 0 to {count - 1}, each once"
         raise ConfigError(file, f"{text}: must be {allowed}")
-    kept = [i for i in range(count) if i not in missing]
+    remaining = [i for i in range(count) if i not in missing]
     row = PATTERNS[robot_file.own_pattern]
-    if len(kept) < row.dof:
+    if len(remaining) < row.dof:
         raise ConfigError(
             file,
-            f"{text}: {too_few(robot_file, len(kept))}: must leave at least {row.dof} cables ({row.description})",
+            f"{text}: {too_few(robot_file, len(remaining))}: must leave at least {row.dof} cables ({row.description})",
         )
     spec = robot_file.model_dump(exclude_none=True)
-    spec |= {name: [value[i] for i in kept] for name, value in spec.items() if _is_per_cable(name, value)}
+    spec |= {name: [value[i] for i in remaining] for name, value in spec.items() if _is_per_cable(name, value)}
     if robot_file.winch is not None:
-        spec["winch"] = robot_file.winch.of_cables(kept).model_dump(exclude_none=True)
+        spec["winch"] = robot_file.winch.of_cables(remaining).model_dump(exclude_none=True)
     try:
-        return checked(RobotFile, spec, file).as_remaining(robot_file, kept)
+        return checked(RobotFile, spec, file).as_remaining(robot_file, remaining)
     except ConfigError as error:
         raise ConfigError(file, f"{text}: {str(error).removeprefix(f'{file}: ')}") from error
 

@@ -77,8 +77,8 @@ class RobotFile(LimitKeys):
     _file: Path | None = PrivateAttr(None)  # file that it was read from; None for a table of another file
     # The platform on six cables to which this point mass on three is equivalent, if it is.
     _platform: "RobotFile | None" = PrivateAttr(None)
-    _whole: "RobotFile | None" = PrivateAttr(None)  # the robot with all its cables, if this one lacks some
-    _kept: tuple[int, ...] = PrivateAttr(())  # its cables that this robot still has
+    _full: "RobotFile | None" = PrivateAttr(None)  # the robot with all its cables, if this one lacks some
+    _remaining: tuple[int, ...] = PrivateAttr(())  # its cables that this robot still has
     cable_diameter: Annotated[float, Field(ge=0, le=LARGEST_LENGTH)] | None = Field(
         None, description="diameter of the cables, for distances between bodies, m (default 0)"
     )
@@ -212,37 +212,37 @@ class RobotFile(LimitKeys):
     @property
     def settings(self) -> dict[str, Any]:
         """Plain values on which motions depend: keys of the file, and translation_only of an equivalent."""
-        return self.whole.model_dump(mode="json", exclude_none=True)
+        return self.full.model_dump(mode="json", exclude_none=True)
 
-    def as_remaining(self, whole: "RobotFile", kept: list[int]) -> "RobotFile":
+    def as_remaining(self, full: "RobotFile", remaining: list[int]) -> "RobotFile":
         """This robot as what is left of another one that has lost cables."""
         robot_file = self.model_copy()
-        robot_file._file, robot_file._notes = whole._file, whole._notes
-        robot_file._whole, robot_file._kept = whole, tuple(kept)
+        robot_file._file, robot_file._notes = full._file, full._notes
+        robot_file._full, robot_file._remaining = full, tuple(remaining)
         return robot_file
 
     def of_own_cables(self, limits: Mapping[str, Any]) -> dict[str, Any]:
         """Limits of the cables that are left, of limits that are given for all cables of the file."""
-        if self._whole is None:
+        if self._full is None:
             return dict(limits)
-        count, own = len(self._whole.base_points), dict(limits)
+        count, of_cables = len(self._full.base_points), dict(limits)
         for row in LIMITS:
             value = limits.get(row.name)
             if isinstance(value, list) and row.per_cable:
                 if len(value) != count:
                     raise InputError(row.name, value, f"{row.allowed}, or {count}: one a cable")
-                own[row.name] = [value[i] for i in self._kept]
-        return own
+                of_cables[row.name] = [value[i] for i in self._remaining]
+        return of_cables
 
     @property
-    def whole(self) -> "RobotFile":
+    def full(self) -> "RobotFile":
         """The robot of the file, with all its cables."""
-        return self._whole or self.as_written
+        return self._full or self.as_written
 
     @property
     def missing_cables(self) -> tuple[int, ...]:
         """Cables of the file that the robot has lost, from 0 on."""
-        return () if self._whole is None else tuple(sorted(set(range(len(self._whole.base_points))) - {*self._kept}))
+        return () if self._full is None else tuple(sorted(set(range(len(self._full.base_points))) - {*self._remaining}))
 
     def equivalent(self) -> "RobotFile":
         """The point mass on three cables to which this platform on six cables in parallel pairs is equivalent."""

@@ -107,10 +107,10 @@ def frequency_fields(plan: PlannedMotions, i: int) -> dict[str, float]:
 
 def frequency_words(plan: PlannedMotions) -> str:
     """Lowest natural frequency of a plan, in words; empty on cables that do not stretch."""
-    known = [(row.lowest, row.t, i) for i, row in enumerate(plan.frequencies or ()) if math.isfinite(row.lowest)]
-    if not known:
+    finite_rows = [(row.lowest, row.t, i) for i, row in enumerate(plan.frequencies or ()) if math.isfinite(row.lowest)]
+    if not finite_rows:
         return ""
-    lowest, t, i = min(known)
+    lowest, t, i = min(finite_rows)
     of_segment = f" of the segment to {i + 1}" if len(plan.frequencies or ()) > 1 else ""
     hertz = two_digits(lowest / (2.0 * math.pi))
     return f"elastic cables: lowest natural frequency {lowest:.4g} rad/s ({hertz} Hz) at t = {t:.4g} s{of_segment}"

@@ -41,7 +41,7 @@ class PlannedStop:
     motion: Placed | None
 
     @property
-    def found(self) -> bool:
+    def is_found(self) -> bool:
         """Tell whether there is a proved stop."""
         return bool(self.kind)
 
@@ -52,7 +52,7 @@ class PlannedStop:
             "t", "kind", "duration", "position", "quaternion" and "margin"; null where there is none.
         """
         fields = {"t": self.time, "kind": self.kind or None, "duration": self.duration, "margin": self.margin}
-        if not self.found:
+        if not self.is_found:
             return finite(fields) | {"position": None, "quaternion": None}
         turning = None if self.quaternion is None else self.quaternion.tolist()
         return finite(fields | {"position": self.position.tolist(), "quaternion": turning})
@@ -60,10 +60,10 @@ class PlannedStop:
     @property
     def text(self) -> str:
         """The stop in words."""
-        if not self.found:
+        if not self.is_found:
             return f"from t = {self.time:.4g} s: {NONE}"
-        place = ", ".join(f"{value + 0.0:.4g}" for value in np.round(self.position, 9))
-        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at ({place}), {KINDS[self.kind]}"
+        position = ", ".join(f"{value + 0.0:.4g}" for value in np.round(self.position, 9))
+        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at ({position}), {KINDS[self.kind]}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +85,7 @@ class StopsAlong:
     @property
     def all_found(self) -> bool:
         """Tell whether there is a proved stop from every instant."""
-        return all(stop.found for stop in self.stops)
+        return all(stop.is_found for stop in self.stops)
 
     @property
     def durations(self) -> np.ndarray:
@@ -102,9 +102,9 @@ class StopsAlong:
         """First and last instants of runs of instants from which no stop is found, s."""
         runs = list[list[float]]()
         for before, stop in zip((None, *self.stops), self.stops, strict=False):
-            if stop.found:
+            if stop.is_found:
                 continue
-            if runs and before is not None and not before.found:
+            if runs and before is not None and not before.is_found:
                 runs[-1][1] = stop.time
             else:
                 runs.append([stop.time, stop.time])
@@ -141,11 +141,11 @@ class StopsAlong:
             for first, last in self.intervals_without
         ]
         lines = [f"{TRIED}: from t = {', '.join(missing)}"] if missing else []
-        found = [stop for stop in self.stops if stop.found]
-        if found:
-            longest = max(found, key=lambda stop: stop.duration)
+        proved = [stop for stop in self.stops if stop.is_found]
+        if proved:
+            longest = max(proved, key=lambda stop: stop.duration)
             lines.append(
-                f"{len(found)} of {len(self.stops)} instants have a proved stop; the longest is {longest.text}"
+                f"{len(proved)} of {len(self.stops)} instants have a proved stop; the longest is {longest.text}"
             )
         return lines
 
@@ -163,10 +163,12 @@ class StopsAlong:
         for head in ("from t (s)", "duration (s)", "rest at (m)", "margin (N)", "kind"):
             table.add_column(cell(head), justify="left" if head in ("rest at (m)", "kind") else "right")
         for stop in self.stops:
-            place = f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(stop.position, 9))})" if stop.found else ""
+            position = (
+                f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(stop.position, 9))})" if stop.is_found else ""
+            )
             numbers = (
-                [f"{stop.duration:.4g}", place, f"{stop.margin:.3g}", KINDS[stop.kind]]
-                if stop.found
+                [f"{stop.duration:.4g}", position, f"{stop.margin:.3g}", KINDS[stop.kind]]
+                if stop.is_found
                 else ["", "", "", NONE]
             )
             table.add_row(*map(cell, [f"{stop.time:.4g}", *numbers]))

@@ -33,23 +33,23 @@ def segment_frequencies(
     """Natural frequencies along the segments of a plan; None on cables that do not stretch."""
     if problem.robot.axial_stiffness is None:
         return None
-    ask, found = _asking(problem, robot_file, frame, plan_file), list[MotionFrequencies]()
+    ask, frequencies = _asking(problem, robot_file, frame, plan_file), list[MotionFrequencies]()
     for leg in legs:
         for i, motion in enumerate(leg.motions):
-            stage(f"natural frequencies of segment {len(found) + 1}")
+            stage(f"natural frequencies of segment {len(frequencies) + 1}")
             if not math.isfinite(float(leg.answers.duration[i])):
-                found.append(NOT_TAUT)
+                frequencies.append(NOT_TAUT)
                 continue
             samples = max(SAMPLES, plan_file.samples, OF_ARC * int(leg.answers.tried_arcs[i])) + 1
-            found.append(motion_frequencies(motion, ask(motion), samples, _swing(problem, leg, i, z0)))
-    return tuple(found)
+            frequencies.append(motion_frequencies(motion, ask(motion), samples, _swing(problem, leg, i, z0)))
+    return tuple(frequencies)
 
 
-def frequency_warnings(found: Sequence[MotionFrequencies] | None) -> list[str]:
+def frequency_warnings(frequencies: Sequence[MotionFrequencies] | None) -> list[str]:
     """Lines about segments in which elastic cables may resonate, or in which they do not hold the effector."""
     lines = []
-    for i, segment in enumerate(found or (), start=1):
-        nearest, where = segment.nearest, f"before pose[{i}]: " if len(found or ()) > 1 else ""
+    for i, segment in enumerate(frequencies or (), start=1):
+        nearest, where = segment.nearest, f"before pose[{i}]: " if len(frequencies or ()) > 1 else ""
         if segment.lowest == 0.0:
             lines.append(f"{where}with these elastic cables the effector is not stable at t = {segment.t:.4g} s")
         elif nearest is not None and nearest.is_near:
@@ -72,16 +72,16 @@ def _asking(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: Pl
     # Function that gives frequencies along a motion. A platform in parallel pairs can turn on elastic cables: its six
     # cables count, not the three of the equivalent point mass.
     robot, pairs = problem.robot, robot_file.pairs
-    written, own = robot, frame
+    written, inner_frame = robot, frame
     if pairs is not None:
-        written, own = centred(build_robot(robot_file.as_written, plan_file, Path("plan")))
+        written, inner_frame = centred(build_robot(robot_file.as_written, plan_file, Path("plan")))
 
     def along(motion: Motion) -> FrequenciesAt:
         def frequencies(tau: np.ndarray) -> np.ndarray:
             states = states_at(motion, tau)
             tensions = tensions_in(robot, states, problem.limits, plan_file.tension_rule)
             if pairs is not None:
-                states, tensions = _of_platform(states, frame, own), pairs.tensions(tensions)
+                states, tensions = _of_platform(states, frame, inner_frame), pairs.tensions(tensions)
             return modes_in(written, states, tensions).frequencies
 
         return frequencies
@@ -89,9 +89,9 @@ def _asking(problem: Problem, robot_file: RobotFile, frame: Frame, plan_file: Pl
     return along
 
 
-def _of_platform(states: State, frame: Frame, own: Frame) -> State:
+def _of_platform(states: State, frame: Frame, inner_frame: Frame) -> State:
     # States of a platform that only translates, in the axes of its own kernels.
     count = len(states.position)
     turn, zero = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
-    position: Any = own.inward(frame.outward(states.position))
+    position: Any = inner_frame.inward(frame.outward(states.position))
     return State(position, states.velocity, states.acceleration, turn, zero, zero)  # type: ignore[arg-type]

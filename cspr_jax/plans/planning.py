@@ -236,8 +236,8 @@ def with_motions(
     answers = legs[0].answers
     why, extremes = _causes(plan.frame, legs), _extremes(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
     frequencies = segment_frequencies(plan.problem, plan.robot_file, plan.frame, legs, plan.keys, plan.z0)
-    kept = [line for line in plan.warnings if line not in frequency_warnings(plan.frequencies)]
-    lines = [*kept, *lines, *frequency_warnings(frequencies), *_missed(plan.keys, answers.feasible, extremes)]
+    earlier = [line for line in plan.warnings if line not in frequency_warnings(plan.frequencies)]
+    lines = [*earlier, *lines, *frequency_warnings(frequencies), *_missed(plan.keys, answers.feasible, extremes)]
     changes: dict[str, Any] = {"legs": legs, "demands": extremes, "causes": why, "frequencies": frequencies}
     return dataclasses.replace(plan, warnings=tuple(dict.fromkeys(lines)), **changes)
 

@@ -1,6 +1,6 @@
 """Formats and rates of set points; without jax: the command line uses them before slow work."""
 
-# What a file of set points holds, by its ending.
+# Content of a file of set points, by its ending.
 SETPOINT_FORMATS = {
     ".csv": "a header line and numbers",
     ".yaml": "a JointTrajectory of ROS 2",

@@ -48,7 +48,7 @@ def test_both_points_of_three_spheres(z_axis):
     points = np.array([0.0, 0.0, sign]) * rng.uniform(0.3, 2.0, (500, 1)) + rng.uniform(-0.5, 0.5, (500, 3)) * [1, 1, 0]
     lengths = np.linalg.norm(points[:, None] - SPOOLS, axis=2)
     found = cspr_jax.forward(robot, lengths, all_solutions=True)
-    assert found.is_complete and found.found.all() and (found.count == 2).all() and not found.steps.any()
+    assert found.is_complete and found.is_found.all() and (found.count == 2).all() and not found.steps.any()
     np.testing.assert_allclose(found.positions, points, atol=1e-12)
     normal = np.cross(*(np.array(SPOOLS[1:]) - SPOOLS[0]))
     normal /= np.linalg.norm(normal)
@@ -63,10 +63,10 @@ def test_spheres_that_touch_and_spheres_that_do_not_meet():
     robot = cspr_jax.point_mass(SPOOLS, mass=1.0)
     foot = np.mean(SPOOLS, axis=0) + 0.1 * (np.array(SPOOLS[1]) - SPOOLS[0])
     touching = cspr_jax.forward(robot, np.linalg.norm(foot - SPOOLS, axis=1))
-    assert touching.count.tolist() == [1] and touching.found.all()
+    assert touching.count.tolist() == [1] and touching.is_found.all()
     np.testing.assert_allclose(touching.positions[0], foot, atol=1e-7)
     apart = cspr_jax.forward(robot, [0.1, 0.12, 0.11], all_solutions=True)
-    assert apart.count.tolist() == [0] and not apart.found.any() and np.isnan(apart.all_positions).all()
+    assert apart.count.tolist() == [0] and not apart.is_found.any() and np.isnan(apart.all_positions).all()
     # Least squares cannot do better anywhere around.
     best, rng = (apart.residuals**2).sum(), np.random.default_rng(2)
     others = apart.positions + rng.normal(size=(5000, 3)) * rng.choice([1e-3, 0.03, 0.3], (5000, 1))
@@ -215,7 +215,7 @@ def _check_from_near(given, rng, count, *, radius=None):
     start = _near(given, rng, positions, quaternions)
     found = cspr_jax.forward(_built(given, **cables), lengths, point="mass-centre", **start)
     regular = found.conditioning > 1e-3
-    assert found.found.all() and (found.residual < 1e-9).mean() > 0.95 and regular.sum() > 0.5 * count
+    assert found.is_found.all() and (found.residual < 1e-9).mean() > 0.95 and regular.sum() > 0.5 * count
     again = _targets(given, found.positions, found.quaternions)
     # Two solutions may be as near as the start.
     right = np.abs(again - targets).max((1, 2)) < 1e-7
@@ -253,7 +253,7 @@ def test_poses_are_found_without_a_start():
         robot = _built(given)
         one = cspr_jax.forward(robot, lengths)
         every = cspr_jax.forward(robot, lengths, all_solutions=True)
-        assert one.found.all() and one.residual.max() < 1e-9 and not every.is_complete
+        assert one.is_found.all() and one.residual.max() < 1e-9 and not every.is_complete
         all_targets = _targets(given, np.nan_to_num(every.all_positions), np.nan_to_num(every.all_quaternions, nan=0.5))
         best = np.abs(all_targets - targets[:, None]).max((2, 3)).min(1)
         assert (best < 1e-6).mean() >= (0.9 if cables == 6 else 1.0)
@@ -269,7 +269,7 @@ def test_residuals_of_redundant_cables_are_least():
     positions, quaternions, targets, lengths = _posed(given, rng, 20)
     off = lengths + 0.001 * rng.normal(size=lengths.shape)
     found = cspr_jax.forward(robot, off, start=positions, start_orientations=quaternions)
-    assert found.found.all() and 1e-5 < found.residual.max() < 0.005
+    assert found.is_found.all() and 1e-5 < found.residual.max() < 0.005
     best = (found.residuals**2).sum(1)
     for _ in range(20):
         shift = rng.choice([1e-5, 1e-4, 1e-3]) * rng.normal(size=(20, 3))
@@ -382,9 +382,9 @@ def test_point_masses_at_equilibrium():
     robot, rng = _built(given), np.random.default_rng(2)
     lengths = _posed(given, rng, 10)[3] * rng.uniform(1.0, 1.6, (10, 3))
     found = cspr_jax.forward(robot, lengths, equilibrium=True)
-    assert found.found.all() and found.slack.any() and not found.slack.all(1).any()
+    assert found.is_found.all() and found.slack.any() and not found.slack.all(1).any()
     _energy_is_least(given, found, lengths, rng)
-    assert not cspr_jax.forward(robot, [1.0, 1.0, 1.0], equilibrium=True).found.any()
+    assert not cspr_jax.forward(robot, [1.0, 1.0, 1.0], equilibrium=True).is_found.any()
     alone = cspr_jax.forward(robot, [9.0, 1.0, 9.0], equilibrium=True)
     np.testing.assert_allclose(alone.positions[0], given.base[1] - [0.0, 0.0, 1.0], atol=1e-6)
     assert alone.slack[0].tolist() == [True, False, True]
@@ -398,6 +398,6 @@ def test_platforms_at_equilibrium():
         given = cable_robots.spatial(rng, cables)
         lengths = _posed(given, rng, 4)[3] * rng.uniform(1.0, 1.15, (4, cables))
         found = cspr_jax.forward(_built(given), lengths, equilibrium=True, all_solutions=True)
-        assert found.found.all() and found.slack.any(1).all()
+        assert found.is_found.all() and found.slack.any(1).all()
         _energy_is_least(given, found, lengths, rng)
         np.testing.assert_allclose(found.all_positions[:, 0], found.positions)

@@ -240,9 +240,9 @@ def test_times_and_plans_are_checked(planar):
 def test_stops_of_a_robot_on_four_cables(gone):
     plan = drawn_plan("4", 3, 3)
     found = cspr_jax.stops(plan, instants=4, without=gone or None)
-    assert any(stop.found for stop in found.stops)
+    assert any(stop.is_found for stop in found.stops)
     for stop in found.stops:
-        if stop.found:
+        if stop.is_found:
             check_stop(plan, stop, hanging("4", gone), broken=bool(gone))
 
 
@@ -256,7 +256,7 @@ def test_two_hundred_random_instants_of_ten_plans(kind, seed, capsys):
     times = np.sort(rng.uniform(0.0, float(plan.answers.duration.sum()), 20))
     found = cspr_jax.stops(plan, times=times)
     for stop in found.stops:
-        if stop.found:
+        if stop.is_found:
             check_stop(plan, stop, hanging(kind))
     with capsys.disabled():
         kinds = [stop.kind or "none" for stop in found.stops]

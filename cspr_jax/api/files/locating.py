@@ -1,4 +1,4 @@
-"""What `cspr locate` computes, prints and writes."""
+"""The poses that `cspr locate` computes, prints and writes."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ class Located:
     notes: tuple[str, ...]
 
     @property
-    def found(self) -> np.ndarray:
-        """Whether each row has a pose, (n,)."""
-        return self.answers.found
+    def is_found(self) -> np.ndarray:
+        """Tell of each row whether it has a pose, (n,)."""
+        return self.answers.is_found
 
     def lines(self) -> list[str]:
-        """What is worth saying beside the table."""
+        """Notes on the poses, beside the table."""
         answers, lines = self.answers, list(self.notes)
-        missed = int((~answers.found).sum())
+        missed = int((~answers.is_found).sum())
         if missed and answers.slack is not None:
             return [*lines, f"{missed} rows have no pose in which all cables are within these lengths"]
         if missed:
-            words = "no pose has these lengths" if len(answers.found) == 1 else f"{missed} rows have no pose"
+            words = "no pose has these lengths" if len(answers.is_found) == 1 else f"{missed} rows have no pose"
             lines.append(f"{words}: the nearest is shown, which misses them by up to {answers.residual.max():.3g} m")
         if answers.slack is not None:
             return [*lines, "at equilibrium, of least potential energy; slack cables are longer than their distance"]
         if self.robot.n_cables == self.robot.dof:
-            every = "all solutions there are" if answers.is_complete else "the solutions that were found"
+            solutions = "all solutions there are" if answers.is_complete else "the solutions that were found"
             shown = "shown" if answers.all_positions is not None else "of which one is meant (--all shows all)"
             counts = sorted(set(answers.count.tolist()))
-            several = max(counts) > 1 and (answers.all_positions is not None or answers.is_complete)
-            lines += [f"{' or '.join(map(str, counts))} solutions, {every}, {shown}"] if several else []
-        elif answers.found.any():
+            is_ambiguous = max(counts) > 1 and (answers.all_positions is not None or answers.is_complete)
+            lines += [f"{' or '.join(map(str, counts))} solutions, {solutions}, {shown}"] if is_ambiguous else []
+        elif answers.is_found.any():
             worst = int(np.abs(answers.residuals).max(0).argmax())
             lines.append(f"lengths disagree by up to {answers.residual.max():.3g} m, most on cable {worst + 1}")
         return lines
@@ -88,7 +88,7 @@ class Located:
 
         common: dict[str, Any] = {"schema": 1, "robot": self.robot.name, "z_axis": self.robot.z_axis}
         common |= {"row": (self.rows + 1).tolist(), "t": None if self.times is None else plain(self.times)}
-        common |= {"position": plain(answers.positions), "found": answers.found.tolist()}
+        common |= {"position": plain(answers.positions), "found": answers.is_found.tolist()}
         common |= {"quaternion": plain(answers.quaternions) if self._is_body else None}
         common |= {"residual": plain(answers.residuals), "conditioning": plain(answers.conditioning)}
         common |= {"steps": answers.steps.tolist(), "count": answers.count.tolist(), "complete": answers.is_complete}
@@ -128,13 +128,13 @@ class Located:
                 start = [row + 1] if self.times is None else [row + 1, self.times[i]]
                 pose = [*position, *(turn if self._is_body else [])]
                 slack = [] if answers.slack is None else answers.slack[i].astype(float)
-                rows.append([*start, *pose, answers.residual[i], float(answers.found[i]), *slack])
+                rows.append([*start, *pose, answers.residual[i], float(answers.is_found[i]), *slack])
         return heads, rows
 
 
 def located(
     reference: str,
-    given: Path | list[float],
+    measured: Path | list[float],
     *,
     start: list[float] | None = None,
     angles: bool = False,
@@ -145,19 +145,19 @@ def located(
     robot = load_robot(reference)
     times, rows = None, np.zeros(1, int)
     notes: tuple[str, ...] = ()
-    if isinstance(given, Path):
-        log = read_cable_log(given, robot.n_cables)
+    if isinstance(measured, Path):
+        log = read_cable_log(measured, robot.n_cables)
         angles = log.lengths is None
         values = np.asarray(log.angles if log.lengths is None else log.lengths)
         rows = np.flatnonzero(np.isfinite(values).all(1))
         if not len(rows):
-            raise ConfigError(given, "every row has gaps: must have a row with numbers for all cables")
+            raise ConfigError(measured, "every row has gaps: must have a row with numbers for all cables")
         gaps = len(values) - len(rows)
         notes = (*log.notes, *([f"{gaps} rows with gaps are left out"] if gaps else []))
         times = None if log.times is None else log.times[rows]
         values = values[rows]
     else:
-        values = np.array([given])
+        values = np.array([measured])
     settings: dict[str, Any] = {}
     if start is not None:
         settings["start"] = start[:3]
@@ -167,5 +167,5 @@ def located(
     try:
         answers = forward(robot, values, angles=angles, all_solutions=all_solutions, equilibrium=slack, **settings)
     except InputError as error:
-        raise ConfigError(given if isinstance(given, Path) else reference, str(error)) from error
+        raise ConfigError(measured if isinstance(measured, Path) else reference, str(error)) from error
     return Located(robot, answers, rows, times, notes)

@@ -168,10 +168,10 @@ def _compared(
     search = Search(robot, np.ones(robot.n_cables), None, np.zeros(3))
     positions, quaternions = curves.poses(times[rows] - shift)
     poses = search.near(lengths[rows], positions, quaternions)
-    found, turned = poses.positions[:, 0], poses.quaternions[:, 0]
-    before = np.linalg.norm(found - curves.poses(times[rows])[0], axis=1)
-    after = np.linalg.norm(found - positions, axis=1)
-    cosine = np.minimum(np.abs((turned * quaternions).sum(1)), 1.0)
+    measured, orientations = poses.positions[:, 0], poses.quaternions[:, 0]
+    before = np.linalg.norm(measured - curves.poses(times[rows])[0], axis=1)
+    after = np.linalg.norm(measured - positions, axis=1)
+    cosine = np.minimum(np.abs((orientations * quaternions).sum(1)), 1.0)
     angle = 2.0 * np.arccos(cosine) if search.row.is_body else None
     picked = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(int))
     disagreement, longer = _disagreement(search, poses, picked)
@@ -189,7 +189,7 @@ def _compared(
         position_errors_before=before,
         position_errors=after,
         angle_errors=angle,
-        found=poses.is_found[:, 0],
+        is_found=poses.is_found[:, 0],
         residuals=poses.residuals[:, 0],
         disagreement=disagreement,
         n_spare=robot.n_cables - robot.dof,

@@ -114,5 +114,7 @@ def simulate(  # noqa: PLR0913
     factors = {"mass": mass_factor, "friction": friction_factor, "stiffness": stiffness_factor}
     loop = Loop(rate, bandwidth, delay, encoder_counts, noise, damping_time, **factors, seed=seed)
     with double_precision():
-        found = simulation.simulate(planned, loop)
-    return Simulation(**{field.name: getattr(found, field.name) for field in dataclasses.fields(found)})
+        simulation_result = simulation.simulate(planned, loop)
+    return Simulation(
+        **{field.name: getattr(simulation_result, field.name) for field in dataclasses.fields(simulation_result)}
+    )

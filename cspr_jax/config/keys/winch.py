@@ -16,7 +16,7 @@ ROWS = (*WINCH_NUMBERS, *WINCH_LIMITS)
 WORDS = {row.name: row.description for row in LIMITS if row.of_winch}
 
 
-def _keys() -> dict[str, Any]:
+def _fields() -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for row in ROWS:
         kind = Signs if row.name == "direction" else NotNegativePerCable if row.from_zero else PerCable
@@ -29,7 +29,7 @@ def _keys() -> dict[str, Any]:
 
 
 # A base class whose fields are the rows of `WINCH_NUMBERS` and `WINCH_LIMITS`; Any, since mypy does not know it.
-_Numbers: Any = create_model("_Numbers", __base__=Table, **_keys())
+_Numbers: Any = create_model("_Numbers", __base__=Table, **_fields())
 
 
 class WinchTable(_Numbers):
@@ -43,10 +43,10 @@ class WinchTable(_Numbers):
             if not all(map(row.is_allowed, values)):
                 raise table_error(row.name, value, f"{row.allowed}, or one per cable")
         for pair in TOGETHER:
-            given = [name for name in pair if getattr(self, name) is not None]
-            if len(given) == 1:
-                missing = next(name for name in pair if name not in given)
-                raise table_error(missing, None, f"given beside {given[0]}")
+            names = [name for name in pair if getattr(self, name) is not None]
+            if len(names) == 1:
+                missing = next(name for name in pair if name not in names)
+                raise table_error(missing, None, f"given beside {names[0]}")
         if getattr(self, LOAD) is not None and getattr(self, LINE) is None:
             raise table_error(LINE, None, f"given beside {LOAD}")
         return self
@@ -61,10 +61,10 @@ class WinchTable(_Numbers):
     @property
     def limits(self) -> dict[str, Any]:
         """Limits of the winches; the line is one where the motor has one."""
-        given = {row.name: getattr(self, row.name) for row in WINCH_LIMITS}
-        if given[LOAD] is None and getattr(self, LINE) is not None:
-            given[LOAD] = 1.0
-        return {name: value for name, value in given.items() if value is not None}
+        values = {row.name: getattr(self, row.name) for row in WINCH_LIMITS}
+        if values[LOAD] is None and getattr(self, LINE) is not None:
+            values[LOAD] = 1.0
+        return {name: value for name, value in values.items() if value is not None}
 
     @property
     def has_layers(self) -> bool:

@@ -30,7 +30,7 @@ class ComparedLog:
         position_errors_before: (k,) distances of poses from the planned ones of the same time, m.
         position_errors: (k,) distances after the delay is taken out, m.
         angle_errors: (k,) rotations from the planned orientations, rad; None for a point mass.
-        found: (k,) whether measured lengths have a pose.
+        is_found: (k,) whether measured lengths have a pose.
         residuals: (k, m) lengths of the cables in the pose minus measured ones, m.
         disagreement: cables that do not agree with the others; None with as many cables as degrees of freedom.
         n_spare: number of cables beyond degrees of freedom.
@@ -51,7 +51,7 @@ class ComparedLog:
     position_errors_before: np.ndarray
     position_errors: np.ndarray
     angle_errors: np.ndarray | None
-    found: np.ndarray
+    is_found: np.ndarray
     residuals: np.ndarray
     disagreement: Disagreement | None
     n_spare: int
@@ -64,9 +64,9 @@ class ComparedLog:
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether every row has a pose, and none is farther off than allowed."""
+        """Tell whether every row has a pose, and none is farther off than allowed."""
         limit = math.inf if self.tolerance is None else self.tolerance
-        return bool(self.found.all() and self.position_errors.max() <= limit)
+        return bool(self.is_found.all() and self.position_errors.max() <= limit)
 
 
 def log_object(log: ComparedLog) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def log_object(log: ComparedLog) -> dict[str, Any]:
         "family": log.family,
         "rows": len(log.times),
         "rows_with_gaps": len(log.times) - len(log.rows),
-        "rows_without_pose": int((~log.found).sum()),
+        "rows_without_pose": int((~log.is_found).sum()),
         "delay": _plain(delay.value),
         "delay_deviation": _plain(delay.deviation),
         "delay_rival": _plain(delay.rival),
@@ -106,26 +106,26 @@ def _peak(log: ComparedLog, errors: np.ndarray) -> dict[str, float | None]:
 
 
 def _cable(log: ComparedLog, k: int) -> dict[str, Any]:
-    errors, found = log.length_errors[:, k], {"cable": k}
+    errors, head = log.length_errors[:, k], {"cable": k}
     if not np.isfinite(errors).any():
-        return {**found, "offset": None, "rms": None, "largest": None, "t": None, "slack": [], "lengthened": []}
+        return {**head, "offset": None, "rms": None, "largest": None, "t": None, "slack": [], "lengthened": []}
     worst = int(np.nanargmax(np.abs(errors)))
-    apart = None if log.disagreement is None else log.disagreement
+    disagreement = None if log.disagreement is None else log.disagreement
     row = {
         "offset": _plain(log.delay.offsets[k]),
         "rms": _plain(float(np.sqrt(np.nanmean(errors**2)))),
         "largest": _plain(errors[worst]),
         "t": _plain(log.times[worst]),
-        "constant_error": None if apart is None else _plain(apart.errors[k]),
-        "explains": None if apart is None else _plain(apart.fractions[k]),
+        "constant_error": None if disagreement is None else _plain(disagreement.errors[k]),
+        "explains": None if disagreement is None else _plain(disagreement.fractions[k]),
         "slack": None if log.slack is None else [list(pair) for pair in log.slack[k]],
         "lengthened": [list(pair) for pair in log.lengthened[k]],
     }
-    return found | row | _tension(log, k)
+    return head | row | _tension(log, k)
 
 
 def _tension(log: ComparedLog, k: int) -> dict[str, Any]:
-    # Where the measured tension is below the planned one by most.
+    # The largest difference by which the measured tension is below the planned one, and its time.
     if log.tensions is None or not np.isfinite(log.tensions[:, k]).any():
         return {"tension_shortfall": None, "tension_shortfall_t": None}
     short = log.planned_tensions[:, k] - log.tensions[:, k]
@@ -135,17 +135,17 @@ def _tension(log: ComparedLog, k: int) -> dict[str, Any]:
 
 def disagreeing_cable(log: ComparedLog) -> int | None:
     """Cable that disagrees with the others: the one that explains most, of several alike the one off the plan."""
-    apart = log.disagreement
-    if apart is None or apart.cable is not None:
-        return None if apart is None else apart.cable
+    disagreement = log.disagreement
+    if disagreement is None or disagreement.cable is not None:
+        return None if disagreement is None else disagreement.cable
     first = _off_plan(log)
-    return first if first in _alike(apart) else None
+    return first if first in _alike(disagreement) else None
 
 
-def _alike(apart: Disagreement) -> list[int]:
+def _alike(disagreement: Disagreement) -> list[int]:
     # Cables that explain what disagrees about equally well, where they explain much of it.
-    best = float(apart.fractions.max())
-    return np.flatnonzero(apart.fractions * CLEARLY >= best).tolist() if best >= EXPLAINS else []
+    best = float(disagreement.fractions.max())
+    return np.flatnonzero(disagreement.fractions * CLEARLY >= best).tolist() if best >= EXPLAINS else []
 
 
 def _off_plan(log: ComparedLog) -> int | None:
@@ -157,23 +157,22 @@ def _off_plan(log: ComparedLog) -> int | None:
 
 def disagreement_words(log: ComparedLog) -> str:
     """Which cable disagrees with the others, in words."""
-    apart, off = log.disagreement, _off_plan(log)
+    disagreement, off = log.disagreement, _off_plan(log)
     beside = "" if off is None else f"cable {off + 1} is {_off_words(log.delay.offsets[off])} beside the plan's"
-    if apart is None:
-        told = f"; {beside}, or the pose is off the plan" if beside else ""
-        return f"which cable disagrees cannot be told with as many cables as degrees of freedom{told}"
-    k, alike = disagreeing_cable(log), _alike(apart)
+    if disagreement is None:
+        alternative = f"; {beside}, or the pose is off the plan" if beside else ""
+        return f"which cable disagrees cannot be told with as many cables as degrees of freedom{alternative}"
+    k, alike = disagreeing_cable(log), _alike(disagreement)
     if k is None and len(alike) > 1:
         names = ", ".join(str(i + 1) for i in alike)
-        return (
-            f"one of cables {names} disagrees: each alone explains {apart.fractions.max():.0%} of what no pose explains"
-        )
+        alone = f"each alone explains {disagreement.fractions.max():.0%} of what no pose explains"
+        return f"one of cables {names} disagrees: {alone}"
     if k is None:
-        return f"no cable disagrees more than the others: {_mm(apart.spread)} mm rms that no pose explains"
-    others = np.delete(apart.fractions, k)
-    words = f"cable {k + 1} disagrees: its lengths are {_off_words(apart.errors[k])}, which alone explains"
-    words += f" {apart.fractions[k]:.0%} of what no pose explains (next cable {others.max():.0%})"
-    return words if apart.cable is not None else f"{words}; of cables alike in this, {beside}"
+        return f"no cable disagrees more than the others: {_mm(disagreement.spread)} mm rms that no pose explains"
+    others = np.delete(disagreement.fractions, k)
+    words = f"cable {k + 1} disagrees: its lengths are {_off_words(disagreement.errors[k])}, which alone explains"
+    words += f" {disagreement.fractions[k]:.0%} of what no pose explains (next cable {others.max():.0%})"
+    return words if disagreement.cable is not None else f"{words}; of cables alike in this, {beside}"
 
 
 def _off_words(error: float) -> str:
@@ -192,7 +191,7 @@ def log_lines(log: ComparedLog) -> list[str]:
         lines.append(
             f"angle error: {degrees['rms']:.4g}° rms, largest {degrees['largest']:.4g}° at {degrees['t']:.4g} s"
         )
-    missed = int((~log.found).sum())
+    missed = int((~log.is_found).sum())
     lines += [f"{missed} rows have lengths that no pose has"] if missed else []
     lines += [disagreement_words(log), *_slack_lines(log)]
     if log.tolerance is not None:
@@ -217,10 +216,10 @@ def _peak_words(peak: dict[str, float | None]) -> str:
 def _slack_lines(log: ComparedLog) -> list[str]:
     lines = []
     for k in range(log.length_errors.shape[1]):
-        for found, words in ((log.slack, "is slack"), (log.lengthened, "is longer than the others imply")):
-            if found is not None and found[k]:
-                shown_parts = [f"{a:.4g} to {b:.4g} s" for a, b in found[k][:MOST_INTERVALS]]
-                more = f" and {len(found[k]) - MOST_INTERVALS} more" if len(found[k]) > MOST_INTERVALS else ""
+        for intervals, words in ((log.slack, "is slack"), (log.lengthened, "is longer than the others imply")):
+            if intervals is not None and intervals[k]:
+                shown_parts = [f"{a:.4g} to {b:.4g} s" for a, b in intervals[k][:MOST_INTERVALS]]
+                more = f" and {len(intervals[k]) - MOST_INTERVALS} more" if len(intervals[k]) > MOST_INTERVALS else ""
                 lines.append(f"cable {k + 1} {words} from {', '.join(shown_parts)}{more}")
     return lines
 

@@ -73,10 +73,12 @@ def anchors_of(robot_file: RobotFile, origin: Sequence[float]) -> Anchors:
 def _numbers(robot_file: RobotFile, count: int) -> dict[str, np.ndarray]:
     if robot_file.winch is None:
         return {}
-    given = {row.name: getattr(robot_file.winch, row.name) for row in WINCH_NUMBERS}
-    given |= {row.name: row.default for row in WINCH_NUMBERS if given[row.name] is None}
+    numbers = {row.name: getattr(robot_file.winch, row.name) for row in WINCH_NUMBERS}
+    numbers |= {row.name: row.default for row in WINCH_NUMBERS if numbers[row.name] is None}
     return {
-        name: np.broadcast_to(np.asarray(value, float), (count,)) for name, value in given.items() if value is not None
+        name: np.broadcast_to(np.asarray(value, float), (count,))
+        for name, value in numbers.items()
+        if value is not None
     }
 
 
@@ -104,9 +106,11 @@ def _lost(robot_file: RobotFile, winch: dict[str, np.ndarray]) -> list[str]:
     if robot_file.axial_stiffness is not None:
         lost.append("axial_stiffness: lines are taken not to stretch")
     if winch:
-        turned = [str(k + 1) for k in np.flatnonzero(winch["direction"] < 0.0)]
-        if turned:
-            lost.append(f"direction: motors of cables {', '.join(turned)} wind at growing angles: turn them round")
+        reversed_motors = [str(k + 1) for k in np.flatnonzero(winch["direction"] < 0.0)]
+        if reversed_motors:
+            lost.append(
+                f"direction: motors of cables {', '.join(reversed_motors)} wind at growing angles: turn them round"
+            )
         lost.append("zero_length, friction, inertia and limits of motors")
     lost.append("limits of tensions: no move is checked")
     return lost
@@ -116,9 +120,9 @@ def hangprinter(anchors: Anchors) -> list[str]:
     """Lines of config.g for RepRapFirmware."""
     count = len(anchors.points)
     _check_count(anchors, "hangprinter", 3, len(LETTERS))
-    places = [f"{LETTERS[k]}{':'.join(map(_number, point))}" for k, point in enumerate(anchors.points)]
-    reach = float(np.hypot(anchors.points[:, 0], anchors.points[:, 1]).max())
-    lines = [f"M669 K6 N{count} {' '.join(places)} P{_number(reach)}", "M666 A0"]
+    coordinates = [f"{LETTERS[k]}{':'.join(map(_number, point))}" for k, point in enumerate(anchors.points)]
+    radius = float(np.hypot(anchors.points[:, 0], anchors.points[:, 1]).max())
+    lines = [f"M669 K6 N{count} {' '.join(coordinates)} P{_number(radius)}", "M666 A0"]
     notes = ["N, and more than five anchors from 3.7 on: older firmware has four; A0: it checks no reach"]
     if anchors.radii is not None:
         buildup = float(anchors.buildup.mean())
@@ -162,13 +166,13 @@ def _check_count(anchors: Anchors, firmware: str, low: int, high: int) -> None:
         raise ConfigError("robot", f"{anchors.name}: {count} cables: must be {low} to {high} for {firmware}")
 
 
-def _written(mark: str, anchors: Anchors, lines: list[str], notes: Sequence[str]) -> list[str]:
-    head = f"{mark} {anchors.name}: mm, z up, from the point at which it is homed"
+def _written(prefix: str, anchors: Anchors, lines: list[str], notes: Sequence[str]) -> list[str]:
+    head = f"{prefix} {anchors.name}: mm, z up, from the point at which it is homed"
     return [
         head,
         *lines,
-        *(f"{mark} {note}" for note in notes),
-        *(f"{mark} not held: {words}" for words in anchors.lost),
+        *(f"{prefix} {note}" for note in notes),
+        *(f"{prefix} not held: {words}" for words in anchors.lost),
     ]
 
 

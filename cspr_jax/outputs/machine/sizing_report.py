@@ -28,24 +28,24 @@ def number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def worst(demands: Iterable[MotionDemands], name: str) -> np.ndarray:
+def worst(peaks: Iterable[MotionDemands], name: str) -> np.ndarray:
     """Largest value of each motor; NaN only where there is none."""
-    return functools.reduce(np.fmax, [getattr(each, name) for each in demands])
+    return functools.reduce(np.fmax, [getattr(each, name) for each in peaks])
 
 
-def overall(demands: MotionDemands) -> dict[str, float]:
+def overall(peaks: MotionDemands) -> dict[str, float]:
     """Largest values of any motor, and energies of all of them."""
-    return {name: float((np.sum if name in SUMMED else np.max)(getattr(demands, name))) for name, *_ in COLUMNS}
+    return {name: float((np.sum if name in SUMMED else np.max)(getattr(peaks, name))) for name, *_ in COLUMNS}
 
 
-def demands_object(demands: MotionDemands) -> dict[str, Any]:
+def demands_object(peaks: MotionDemands) -> dict[str, Any]:
     """Demands on each motor and on all of them."""
-    count = len(demands.torque)
-    axes = [{"axis": k + 1} | {name: number(getattr(demands, name)[k]) for name, *_ in COLUMNS} for k in range(count)]
+    count = len(peaks.torque)
+    axes = [{"axis": k + 1} | {name: number(getattr(peaks, name)[k]) for name, *_ in COLUMNS} for k in range(count)]
     return {
-        "duration": number(demands.duration),
+        "duration": number(peaks.duration),
         "axes": axes,
-        "overall": {name: number(value) for name, value in overall(demands).items()},
+        "overall": {name: number(value) for name, value in overall(peaks).items()},
     }
 
 
@@ -66,7 +66,7 @@ def size_object(
         **object_of_joint,
         "required": required,
         "limits": {name: np.asarray(values).tolist() for name, values in limits.items()},
-        "sources": [{"name": name} | demands_object(demands) for name, demands in each.items()],
+        "sources": [{"name": name} | demands_object(peaks) for name, peaks in each.items()],
     }
 
 

@@ -55,12 +55,12 @@ class Drives:
 
     def paid_out(self, angle: np.ndarray) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
         """Lengths that the drums have paid out, and by how much they fall per rad."""
-        length, fall = np.empty(len(angle)), np.empty(len(angle))
+        length, paid_out_per_rad = np.empty(len(angle)), np.empty(len(angle))
         for k, (x, angles, lengths) in enumerate(zip(angle.tolist(), self.angles, self.lengths, strict=True)):
             i = min(max(int(angles.searchsorted(x)) - 1, 0), len(angles) - 2)
-            fall[k] = (lengths[i] - lengths[i + 1]) / (angles[i + 1] - angles[i])
-            length[k] = lengths[i] - fall[k] * (x - angles[i])
-        return length, fall
+            paid_out_per_rad[k] = (lengths[i] - lengths[i + 1]) / (angles[i + 1] - angles[i])
+            length[k] = lengths[i] - paid_out_per_rad[k] * (x - angles[i])
+        return length, paid_out_per_rad
 
     def next_speed(
         self, speed: np.ndarray, torque: np.ndarray, load: np.ndarray, step: float
@@ -71,7 +71,7 @@ class Drives:
         return np.sign(free) * np.maximum(np.abs(free) - step / self.inertia * (self.friction + lost), 0.0)
 
 
-class SetPoints(NamedTuple):
+class WindingSetPoints(NamedTuple):
     """Set points of n winches at m ticks.
 
     Fields:
@@ -115,7 +115,7 @@ class Loop:
 
 
 class Driven(NamedTuple):
-    """What the simulation gives at m ticks.
+    """Results of the simulation at m ticks.
 
     Fields:
         coordinates: (m, nq) coordinates of MuJoCo's joints.
@@ -133,7 +133,9 @@ class Driven(NamedTuple):
 class _Controller:
     """Controller of all motors: torques of set points, corrected by the errors of measured angles and speeds."""
 
-    def __init__(self, points: SetPoints, gains: tuple[np.ndarray, np.ndarray], counts: np.ndarray, loop: Loop) -> None:
+    def __init__(
+        self, points: WindingSetPoints, gains: tuple[np.ndarray, np.ndarray], counts: np.ndarray, loop: Loop
+    ) -> None:
         self._points, self._gains, self._loop = points, gains, loop
         self._random, self._count = np.random.default_rng(loop.seed), 2.0 * math.pi / np.maximum(counts, 1.0)
         self._is_exact = counts == 0.0
@@ -154,7 +156,7 @@ class _Controller:
 def driven(
     body: Suspended,
     moved: Played,
-    points: SetPoints,
+    points: WindingSetPoints,
     drives: Drives,
     axial_stiffness: Float[np.ndarray, "n_cables"],
     winch_of: Int[np.ndarray, "n_cables"],
@@ -173,50 +175,50 @@ def driven(
     mujoco.mj_forward(model, data)
     stiffness, angle = axial_stiffness * loop.stiffness, points.angle[0].copy()
     # Over pulleys MuJoCo's tendons begin below the entry points.
-    paid, fall = drives.paid_out(angle)
+    paid, paid_out_per_rad = drives.paid_out(angle)
     before = data.ten_length[:count] - paid[winch_of] * (1.0 + moved.tension[0] / axial_stiffness)
     period = 1.0 / loop.rate
-    steps = _steps(body, drives, stiffness, paid[winch_of], fall[winch_of], winch_of, period)
+    steps = _steps(body, drives, stiffness, paid[winch_of], paid_out_per_rad[winch_of], winch_of, period)
     model.opt.timestep = step = period / steps
-    controller = _Controller(points, _gains(body, drives, fall, loop), drives.counts, loop)
+    controller = _Controller(points, _gains(body, drives, paid_out_per_rad, loop), drives.counts, loop)
     waiting = collections.deque([points.torque[0]] * round(loop.delay * loop.rate * steps))
-    speed, found = points.speed[0].copy(), _empty(len(points.angle), model.nq, count, len(angle))
+    speed, recorded = points.speed[0].copy(), _empty(len(points.angle), model.nq, count, len(angle))
     for tick in range(len(points.angle)):
         command = np.clip(controller.torque(tick, angle), -drives.torque_max, drives.torque_max)
         for k in range(steps):
             waiting.append(command)
             torque = waiting.popleft()
-            paid, fall = drives.paid_out(angle)
+            paid, paid_out_per_rad = drives.paid_out(angle)
             of_cables = paid[winch_of]
-            stretch = data.ten_length[:count] - before - of_cables
-            rate = data.ten_velocity[:count] + (fall * speed)[winch_of]
-            tension = np.maximum(stiffness * (stretch + loop.damping_time * rate) / of_cables, 0.0)
+            elongation = data.ten_length[:count] - before - of_cables
+            rate = data.ten_velocity[:count] + (paid_out_per_rad * speed)[winch_of]
+            tension = np.maximum(stiffness * (elongation + loop.damping_time * rate) / of_cables, 0.0)
             if k == 0:
                 for name, value in zip(Driven._fields, (data.qpos, tension, angle, torque), strict=True):
-                    found[name][tick] = value
-            load = fall * np.bincount(winch_of, tension, len(angle))
+                    recorded[name][tick] = value
+            load = paid_out_per_rad * np.bincount(winch_of, tension, len(angle))
             speed = drives.next_speed(speed, torque, load, step)
             angle = angle + step * speed
             data.ctrl[:] = tension
             mujoco.mj_step(model, data)
-    return Driven(**found)
+    return Driven(**recorded)
 
 
 def _empty(ticks: int, n_coordinates: int, n_cables: int, n_winches: int) -> dict[str, np.ndarray]:
     sizes = (n_coordinates, n_cables, n_winches, n_winches)
-    return {name: np.empty((ticks, size)) for name, size in zip(Driven._fields, sizes, strict=True)}
+    return {name: np.empty((ticks, extent)) for name, extent in zip(Driven._fields, sizes, strict=True)}
 
 
-def _steps(body, drives, stiffness, lengths, fall, winch_of, period) -> int:
+def _steps(body, drives, stiffness, lengths, paid_out_per_rad, winch_of, period) -> int:
     # Resolve the fastest oscillation: a cable between the inertia of its drum and the effector.
-    masses = 1.0 / body.mass + fall**2 / drives.inertia[winch_of]
+    masses = 1.0 / body.mass + paid_out_per_rad**2 / drives.inertia[winch_of]
     if body.inertia is not None:
         masses = masses + np.sum(body.points**2, axis=1) / np.linalg.eigvalsh(body.inertia).min()
     fastest = math.sqrt(float(np.max(stiffness / lengths * masses) * len(winch_of)))
     return math.ceil(period * fastest * STEPS_A_PERIOD / (2.0 * math.pi))
 
 
-def _gains(body: Suspended, drives: Drives, fall: np.ndarray, loop: Loop) -> tuple[np.ndarray, np.ndarray]:
+def _gains(body: Suspended, drives: Drives, paid_out_per_rad: np.ndarray, loop: Loop) -> tuple[np.ndarray, np.ndarray]:
     # Critically damped loops of rotors that carry their parts of the effector's mass.
-    inertia = drives.inertia + body.mass * fall**2 / len(fall)
+    inertia = drives.inertia + body.mass * paid_out_per_rad**2 / len(paid_out_per_rad)
     return inertia * loop.bandwidth**2, 2.0 * inertia * loop.bandwidth

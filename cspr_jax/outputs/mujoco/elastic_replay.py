@@ -68,9 +68,9 @@ class ElasticPlan:
     def to_dict(self) -> dict[str, Any]:
         """Deviations with and without compensation, at the end and at most, as plain values."""
         full = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
-        ways = {name: self._of(getattr(self, name)) for name in ("compensated", "uncompensated")}
-        ways["uncompensated"]["settled"] = self.settled if np.isfinite(self.settled) else None
-        return full | ways
+        paths = {name: self._of(getattr(self, name)) for name in ("compensated", "uncompensated")}
+        paths["uncompensated"]["settled"] = self.settled if np.isfinite(self.settled) else None
+        return full | paths
 
     def _of(self, path: PlayedPath) -> dict[str, Any]:
         distance = self.deviation(path)
@@ -83,14 +83,14 @@ class ElasticPlan:
 
     def lines(self) -> list[str]:
         """Deviations for people."""
-        told = self.to_dict()
+        values = self.to_dict()
         text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}, elastic cables"]
         for name, how in (("compensated", "unstretched lengths set"), ("uncompensated", "stretch not compensated")):
-            of_way = told[name]
+            of_way = values[name]
             end, largest = (_distance(of_way[key]["distance"]) for key in ("end", "largest"))
-            turn, turned = of_way["end"]["turn"], of_way["largest_turn"]["turn"]
-            angles = f" and {two_digits(turn)} rad", f" and {two_digits(turned)} rad"
-            first, second = angles if turned > 0.0 else ("", "")
+            turn, largest_turn = of_way["end"]["turn"], of_way["largest_turn"]["turn"]
+            angles = f" and {two_digits(turn)} rad", f" and {two_digits(largest_turn)} rad"
+            first, second = angles if largest_turn > 0.0 else ("", "")
             at = f"at most {largest}{second}, at {of_way['largest']['t']:.2f} s"
             text.append(f"{how}: {end}{first} off the plan at the end, {at}")
         if np.isfinite(self.settled):
@@ -131,13 +131,13 @@ def replay_elastic(plan: PlannedMotions, step: float = STEP) -> ElasticPlan:
 
 
 def _hanging(plan: PlannedMotions, motion: Motion, tau: float) -> Settled:
-    # Where the robot hangs if drums set the lengths of cables that do not stretch.
+    # The pose in which the robot hangs if drums set the lengths of cables that do not stretch.
     robot = plan.problem.robot
     states = states_at(motion, np.array([tau]))
     tensions = tensions_in(robot, states, plan.problem.limits, plan.keys.tension_rule)[0]
     state = jax.tree.map(lambda values: values[0], states)
-    found: Settled = _settled(robot, state, tensions)
-    return found._replace(missed=found.missed / (robot.mass * robot.gravity))
+    solution: Settled = _settled(robot, state, tensions)
+    return solution._replace(missed=solution.missed / (robot.mass * robot.gravity))
 
 
 @jax.jit
@@ -159,15 +159,15 @@ def _highest(plan: PlannedMotions) -> float:
 def _started(plan: PlannedMotions, moved: Played, start: Settled) -> Played:
     # The planned start, and the place where the robot hangs then.
     world = upward(plan.robot_file.z_axis)
-    place = world.rotated(plan.frame.outward(np.asarray(start.state.position)))
+    position = world.rotated(plan.frame.outward(np.asarray(start.state.position)))
     changes: dict[str, Any] = {
-        "position": np.stack([moved.position[0], place]),
+        "position": np.stack([moved.position[0], position]),
         "velocity": moved.velocity[:2],
         "acceleration": moved.acceleration[:2],
     }
     if moved.rotation is not None and moved.omega is not None and moved.omega_dot is not None:
-        turned = world.rotated_tensor(plan.frame.rotated_tensor(np.asarray(start.state.rotation)))
-        both = Rotation.from_matrix(np.stack([moved.rotation[0].as_matrix(), turned]))
+        rotation = world.rotated_tensor(plan.frame.rotated_tensor(np.asarray(start.state.rotation)))
+        both = Rotation.from_matrix(np.stack([moved.rotation[0].as_matrix(), rotation]))
         changes |= {"rotation": both, "omega": moved.omega[:2], "omega_dot": moved.omega_dot[:2]}
     return dataclasses.replace(moved, **changes)
 

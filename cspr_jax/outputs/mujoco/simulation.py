@@ -15,7 +15,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.machine.setpoints import set_points
 from cspr_jax.motion.ticks import ticks
 from cspr_jax.outputs.motion_files import rows_at
-from cspr_jax.outputs.mujoco.closed_loop import Driven, Drives, Loop, SetPoints, driven
+from cspr_jax.outputs.mujoco.closed_loop import Driven, Drives, Loop, WindingSetPoints, driven
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import Played, in_world, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
@@ -90,26 +90,26 @@ class Simulated:
 
     def lines(self) -> list[str]:
         """The largest errors for people."""
-        found, loop = self.to_dict(), self.loop
+        errors, loop = self.to_dict(), self.loop
         control = (
             f"position loops of {loop.bandwidth:g} rad/s" if loop.bandwidth else "set points alone, without feedback"
         )
-        position, tension, torque = found["position"], found["tension"], found["motor_torque"]
+        position, tension, torque = errors["position"], errors["tension"], errors["motor_torque"]
         text = [
             f"{self.robot}: {self.time[-1]:.2f} s at {loop.rate:g} Hz in MuJoCo {self.mujoco}; {control}",
             f"position: at most {two_digits(position['value'])} m off the plan, at {position['t']:.2f} s; "
             f"{two_digits(position['at_end'])} m at its end",
         ]
         if self.rotated.any():
-            turn = found["rotation"]
+            turn = errors["rotation"]
             text.append(
                 f"orientation: at most {two_digits(turn['value'])} rad off, at {turn['t']:.2f} s; "
                 f"{two_digits(turn['at_end'])} rad at its end"
             )
-        slack = f"; a cable is slack {found['slack_fraction']:.1%} of the time" if found["slack_fraction"] else ""
+        slack = f"; a cable is slack {errors['slack_fraction']:.1%} of the time" if errors["slack_fraction"] else ""
         text.append(
             f"tensions: at most {two_digits(tension['value'])} N off, cable {tension['cable'] + 1}, at "
-            f"{tension['t']:.2f} s; smallest {found['tension_min']:.3g} N{slack}"
+            f"{tension['t']:.2f} s; smallest {errors['tension_min']:.3g} N{slack}"
         )
         text.append(f"motors: torques of at most {two_digits(torque['value'])} N m, at {torque['t']:.2f} s")
         return text
@@ -136,8 +136,10 @@ def simulate(plan: PlannedMotions, loop: Loop) -> Simulated:
     found_points = set_points(robot, plan.problem.limits, motions, durations, loop.rate, plan.keys.tension_rule)
     body, points = suspended(plan), _winding(found_points, np.asarray(robot.winches.direction))
     stiffness = np.broadcast_to(np.asarray(written.axial_stiffness, float), (len(body.spools),))
-    found = driven(body, moved, points, _drives(robot.winches, loop), stiffness, _winch_of(plan, len(stiffness)), loop)
-    reached, rotated = _poses(moved, found, body.axes)
+    simulation = driven(
+        body, moved, points, _drives(robot.winches, loop), stiffness, _winch_of(plan, len(stiffness)), loop
+    )
+    reached, rotated = _poses(moved, simulation, body.axes)
     return Simulated(
         robot=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -148,15 +150,15 @@ def simulate(plan: PlannedMotions, loop: Loop) -> Simulated:
         reached=world.rotated(reached),
         rotated=rotated,
         tension=moved.tension,
-        tension_reached=found.tension,
-        angle_error=found.angle - points.angle,
+        tension_reached=simulation.tension,
+        angle_error=simulation.angle - points.angle,
         torque=points.torque,
-        torque_reached=found.torque,
+        torque_reached=simulation.torque,
     )
 
 
-def _winding(points: Any, direction: np.ndarray) -> SetPoints:
-    return SetPoints(*(-direction * each for each in (points.angle, points.speed, points.torque)))
+def _winding(points: Any, direction: np.ndarray) -> WindingSetPoints:
+    return WindingSetPoints(*(-direction * each for each in (points.angle, points.speed, points.torque)))
 
 
 def _winch_of(plan: PlannedMotions, n_cables: int) -> np.ndarray:
@@ -177,16 +179,16 @@ def _drives(winches: Winches, loop: Loop) -> Drives:
     friction, viscous = (loop.friction * np.asarray(x) for x in (winches.friction, winches.viscous_friction))
     inertia, efficiency = np.asarray(winches.motor_inertia), np.asarray(winches.efficiency)
     largest = np.full(len(inertia), np.inf)
-    own = COUNTS if winches.encoder_counts is None else np.asarray(winches.encoder_counts)
-    counts = np.broadcast_to(np.asarray(own if loop.counts is None else loop.counts, float), inertia.shape)
+    of_robot = COUNTS if winches.encoder_counts is None else np.asarray(winches.encoder_counts)
+    counts = np.broadcast_to(np.asarray(of_robot if loop.counts is None else loop.counts, float), inertia.shape)
     return Drives(list(angles.T), list(ends.T), inertia, friction, viscous, efficiency, largest, counts)
 
 
-def _poses(moved: Played, found: Driven, axes: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _poses(moved: Played, simulation: Driven, axes: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     position, rotated = moved.position.copy(), np.zeros(len(moved.position))
     if moved.rotation is None:
-        position[:, list(axes)] = found.coordinates[:, : len(axes)]
+        position[:, list(axes)] = simulation.coordinates[:, : len(axes)]
     else:
-        position[:], quaternions = found.coordinates[:, :3], np.roll(found.coordinates[:, 3:7], -1, axis=1)
+        position[:], quaternions = simulation.coordinates[:, :3], np.roll(simulation.coordinates[:, 3:7], -1, axis=1)
         rotated = (moved.rotation.inv() * Rotation.from_quat(quaternions)).magnitude()
     return position, rotated

@@ -25,8 +25,8 @@ def lines(points: SetPoints, rate: float, counts: np.ndarray | None) -> Iterator
     numbers = range(1, points.angle.shape[1] + 1)
     yield f"# cycle time {1.0 / rate!r} s"
     yield "\t".join(f"{head}_{k}" for head in ("count", "count_rate", "torque") for k in numbers)
-    for whole, torque in zip(integers.tolist(), points.torque.tolist(), strict=True):
-        yield "\t".join([*map(str, whole), *map(repr, torque)])
+    for counts_of_row, torque in zip(integers.tolist(), points.torque.tolist(), strict=True):
+        yield "\t".join([*map(str, counts_of_row), *map(repr, torque)])
 
 
 def _check_end(points: SetPoints, rate: float) -> None:

@@ -56,14 +56,14 @@ def _points(points: SetPoints) -> Iterator[dict]:
         arrays = (points.angle, points.speed, points.motor_acceleration, points.torque)  # type: ignore[assignment]
     stamps = np.rint(points.t * NANO).astype(np.int64)
     # Times must increase: the row just before the end may have its time in nanoseconds.
-    kept = np.append(np.diff(stamps) > 0, True)
+    is_later = np.append(np.diff(stamps) > 0, True)
     names = ("positions", "velocities", "accelerations", "effort")
-    for stamp, *values in zip(stamps[kept].tolist(), *(array[kept].tolist() for array in arrays), strict=True):
+    for stamp, *values in zip(stamps[is_later].tolist(), *(array[is_later].tolist() for array in arrays), strict=True):
         time = dict(zip(("sec", "nanosec"), divmod(stamp, NANO), strict=True))
         yield dict(zip(names, values, strict=True)) | {"time_from_start": time}
 
 
 def _yaml_number(value: float) -> str:
     # YAML 1.1 takes 1e-05 for a word: its numbers have a dot before the exponent.
-    mantissa, mark, exponent = repr(value).partition("e")
-    return mantissa + (".0" if mark and "." not in mantissa else "") + mark + exponent
+    mantissa, exponent_letter, exponent = repr(value).partition("e")
+    return mantissa + (".0" if exponent_letter and "." not in mantissa else "") + exponent_letter + exponent

@@ -44,21 +44,21 @@ def _columns(path: Path, rows: Iterable[list[str]]) -> dict[str, np.ndarray]:
         table = np.array(body, float)
     except ValueError as error:
         raise ConfigError(path, f"must hold only numbers below its header line: {error}") from None
-    places: dict[str, list[int]] = {}
+    indices: dict[str, list[int]] = {}
     for k, head in enumerate(heads):
         name, number = ("t", 1) if head == "t" else (m[1], int(m[2])) if (m := _HEAD.match(head)) else ("", 0)
-        if not name or number != len(places.setdefault(name, [])) + 1:
+        if not name or number != len(indices.setdefault(name, [])) + 1:
             raise ConfigError(path, f"{shown(head)}: heads must be t, and names with the numbers of cables from 1 on")
-        places[name].append(k)
-    return {name: table[:, columns[0] if name == "t" else columns] for name, columns in places.items()}
+        indices[name].append(k)
+    return {name: table[:, columns[0] if name == "t" else columns] for name, columns in indices.items()}
 
 
 def _cycles(path: Path, text: str) -> dict[str, np.ndarray]:
     first, *rows = text.splitlines() or [""]
     if not (match := _CYCLE.match(first)):
         raise ConfigError(path, f"{shown(first)}: the first line must be # cycle time, a number, s")
-    found = _columns(path, (row.split("\t") for row in rows))
-    return {"t": np.arange(len(rows) - 1) * float(match[1]), **found}
+    columns = _columns(path, (row.split("\t") for row in rows))
+    return {"t": np.arange(len(rows) - 1) * float(match[1]), **columns}
 
 
 def _parsed(path: Path, text: str) -> Any:
@@ -83,8 +83,8 @@ def _joints(path: Path, message: Any) -> dict[str, np.ndarray]:
         stamps = [point["time_from_start"] for point in points]
         times = np.array([(stamp["sec"] * NANO + stamp["nanosec"]) / NANO for stamp in stamps], float)
         arrays = {
-            own[is_cable]: np.array([point[name] for point in points], float)
-            for name, own in _OF_JOINTS.items()
+            quantities[is_cable]: np.array([point[name] for point in points], float)
+            for name, quantities in _OF_JOINTS.items()
             if points and name in points[0]
         }
     except (KeyError, TypeError, IndexError, ValueError):

@@ -56,10 +56,12 @@ def _paths(panel: Axes, simulated: Simulated, j: int) -> None:
     legend_above(panel, 2)
 
 
-def _cables(panel: Axes, time: np.ndarray, planned: np.ndarray, found: np.ndarray, label: str, of_what: str) -> None:
+def _cables(
+    panel: Axes, time: np.ndarray, planned: np.ndarray, simulated: np.ndarray, label: str, of_what: str
+) -> None:
     for k in range(planned.shape[1]):
         colour = line_style(k)["color"]
-        panel.plot(time, found[:, k], linewidth=0.7, alpha=0.75, label=f"{of_what} {k + 1}", color=colour)
+        panel.plot(time, simulated[:, k], linewidth=0.7, alpha=0.75, label=f"{of_what} {k + 1}", color=colour)
     for k in range(planned.shape[1]):
         panel.plot(time, planned[:, k], linewidth=0.6, color="black", label="" if k else "planned")
     panel.set_ylabel(label)

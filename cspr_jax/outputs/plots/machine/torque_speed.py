@@ -71,7 +71,7 @@ def _draw(
         stall, fastest = (float(limits["line"][i][k]) for i in (0, 1))
         corners = np.array([[0.0, stall], [fastest, 0.0], [0.0, -stall], [-fastest, 0.0], [0.0, stall]])
         panel.plot(*corners.T, color="black", linewidth=1.3)
-        right, top = (max(now, min(1.1 * end, FAR * now)) for now, end in ((right, fastest), (top, stall)))
+        right, top = (max(shown, min(1.1 * end, FAR * shown)) for shown, end in ((right, fastest), (top, stall)))
     for name, draw in (("motor_torque_max", panel.axhline), ("motor_speed_max", panel.axvline)):
         for sign in (1.0, -1.0) if name in limits else ():
             draw(sign * float(limits[name][k]), color=COLOURS[1], linewidth=1.0, linestyle=DASHES)

@@ -20,34 +20,34 @@ MARKERS = {"rest": "s", "path": "^", "free": "o", "swing": "D"}
 NONE_COLOUR = "#b00000"
 
 
-def stops_figure(stops: StopsAlong) -> Figure:
+def stops_figure(answer: StopsAlong) -> Figure:
     """Paths of plan and stops, and durations."""
-    path = _path(stops)
+    path = _path(answer)
     is_planar = np.ptp(path[:, 1]) <= ONE_PLANE * np.ptp(path[:, 0])
     views = {"xz": 2} if is_planar else {"xy": 1, "xz": 2}
     rows: list[Any] = [[*views] * (2 // len(views)), ["duration"] * 2]
     figure = Figure(figsize=(9.0, 7.2), layout="constrained")
     panels = figure.subplot_mosaic(rows, height_ratios=[1.5, 1.0])
-    drawn = [stop for stop in stops.stops if stop.motion is not None]
+    drawn = [stop for stop in answer.stops if stop.motion is not None]
     drawn = drawn[:: max(1, -(-len(drawn) // SHOWN))]
     for name, j in views.items():
-        _paths(panels[name], stops, path, drawn, j)
-    if stops.plan.robot_file.z_axis == "down":
+        _paths(panels[name], answer, path, drawn, j)
+    if answer.plan.robot_file.z_axis == "down":
         panels["xz"].invert_yaxis()
-    _durations(panels["duration"], stops)
-    found = sum(stop.found for stop in stops.stops)
-    numbers = [str(i + 1) for i in stops.without]
+    _durations(panels["duration"], answer)
+    count = sum(stop.is_found for stop in answer.stops)
+    numbers = [str(i + 1) for i in answer.without]
     gone = f", cable{'s' * (len(numbers) > 1)} {', '.join(numbers)} broken" if numbers else ""
     figure.suptitle(
-        f"{stops.plan.robot_file.name}: proved stops from {found} of {len(stops.stops)} instants{gone}, "
-        f"z axis {stops.plan.robot_file.z_axis}"
+        f"{answer.plan.robot_file.name}: proved stops from {count} of {len(answer.stops)} instants{gone}, "
+        f"z axis {answer.plan.robot_file.z_axis}"
     )
     return figure
 
 
-def _path(stops: StopsAlong) -> np.ndarray:
+def _path(answer: StopsAlong) -> np.ndarray:
     # Positions along the plan.
-    motions = stops.plan.motions
+    motions = answer.plan.motions
     tau = np.linspace(0.0, 1.0, max(2, POINTS // len(motions)))
     return np.concatenate([np.asarray(states_at(motion, tau).position) for motion in motions])
 
@@ -56,9 +56,9 @@ def _colour(kind: str) -> str:
     return COLOURS[list(KINDS).index(kind)]
 
 
-def _paths(panel: Axes, stops: StopsAlong, path: np.ndarray, drawn: list[PlannedStop], j: int) -> None:
-    spools = np.asarray(stops.plan.robot_file.whole.base_points, float)
-    gone = np.isin(np.arange(len(spools)), [*stops.without, *stops.plan.robot_file.missing_cables])
+def _paths(panel: Axes, answer: StopsAlong, path: np.ndarray, drawn: list[PlannedStop], j: int) -> None:
+    spools = np.asarray(answer.plan.robot_file.full.base_points, float)
+    gone = np.isin(np.arange(len(spools)), [*answer.without, *answer.plan.robot_file.missing_cables])
     panel.plot(path[:, 0], path[:, j], color="black", linewidth=2.0, alpha=0.3, label="plan")
     for stop in drawn:
         if stop.motion is None or stop.kind == "rest":
@@ -76,20 +76,20 @@ def _paths(panel: Axes, stops: StopsAlong, path: np.ndarray, drawn: list[Planned
     legend_above(panel, 3)
 
 
-def _durations(panel: Axes, stops: StopsAlong) -> None:
-    times, durations = stops.times, stops.durations
+def _durations(panel: Axes, answer: StopsAlong) -> None:
+    times, durations = answer.times, answer.durations
     panel.plot(times, durations, color="black", linewidth=0.8, alpha=0.5)
-    kinds = np.array([stop.kind for stop in stops.stops])
+    kinds = np.array([stop.kind for stop in answer.stops])
     for kind, words in KINDS.items():
         rows = kinds == kind
         if rows.any():
             style: dict[str, Any] = {"marker": MARKERS[kind], "markersize": 4, "linestyle": "", "color": _colour(kind)}
             panel.plot(times[rows], durations[rows], label=words, **style)
     step = np.diff(times).min() if len(times) > 1 else 1.0
-    for i, (first, last) in enumerate(stops.intervals_without):
+    for i, (first, last) in enumerate(answer.intervals_without):
         label: dict[str, Any] = {} if i else {"label": "none found"}
         panel.axvspan(first - 0.5 * step, last + 0.5 * step, color=NONE_COLOUR, alpha=0.15, linewidth=0.0, **label)
-    for end in np.cumsum(stops.plan.answers.duration)[:-1]:
+    for end in np.cumsum(answer.plan.answers.duration)[:-1]:
         panel.axvline(end, color="black", linewidth=0.8, alpha=0.3)
     panel.set(xlabel="instant on the plan (s)", ylabel="time to rest (s)", ylim=(0.0, None))
     panel.margins(x=0.01)

@@ -14,17 +14,19 @@ def log_content(log: ComparedLog) -> dict[str, Any]:
     """Title, text and charts of the page."""
     first, *facts = log_lines(log)
     cables = [f"cable {k + 1}" for k in range(log.length_errors.shape[1])]
-    known = log.times[log.rows]
+    times = log.times[log.rows]
     errors = {"before the delay is taken out": log.position_errors_before, "after": log.position_errors}
     levels = [] if log.tolerance is None else [{"words": "tolerance", "value": 1000.0 * log.tolerance}]
-    charts = [_chart("position error", "mm", known, {name: 1000.0 * row for name, row in errors.items()}, levels)]
+    charts = [_chart("position error", "mm", times, {name: 1000.0 * row for name, row in errors.items()}, levels)]
     if log.angle_errors is not None:
-        charts.append(_chart("angle error", "°", known, {"after the delay": np.degrees(log.angle_errors)}))
+        charts.append(_chart("angle error", "°", times, {"after the delay": np.degrees(log.angle_errors)}))
     of_cables = dict(zip(cables, 1000.0 * log.length_errors.T, strict=True))
-    charts.append(_chart("measured minus planned length", "mm", log.times, of_cables, bands=_bands(log.lengthened)))
+    charts.append(
+        _chart("measured minus planned length", "mm", log.times, of_cables, intervals=_intervals(log.lengthened))
+    )
     if log.n_spare:
         rest = dict(zip(cables, -1000.0 * log.residuals.T, strict=True))
-        charts.append(_chart("length that no pose explains", "mm", known, rest, bands=_bands(log.lengthened)))
+        charts.append(_chart("length that no pose explains", "mm", times, rest, intervals=_intervals(log.lengthened)))
     if log.tensions is not None:
         pairs = zip(cables, log.tensions.T, log.planned_tensions.T, strict=True)
         lines = {
@@ -32,7 +34,7 @@ def log_content(log: ComparedLog) -> dict[str, Any]:
             for cable, *rows in pairs
             for name, values in zip((cable, f"{cable}, planned"), rows, strict=True)
         }
-        charts.append(_chart("tension", "N", log.times, lines, bands=_bands(log.slack or []), is_paired=True))
+        charts.append(_chart("tension", "N", log.times, lines, intervals=_intervals(log.slack or []), is_paired=True))
     title = f"Log of {log.robot}"
     page: dict[str, Any] = {"title": title, "notes": first, "map": None, "motions": [], "cells": {}}
     return page | {"charts": charts, "facts": facts}
@@ -44,7 +46,7 @@ def _chart(
     times: np.ndarray,
     lines: dict[str, np.ndarray],
     levels: list[dict[str, Any]] | None = None,
-    bands: list[tuple[float, float]] | None = None,
+    intervals: list[tuple[float, float]] | None = None,
     is_paired: bool = False,
 ) -> dict[str, Any]:
     rows = np.unique(np.linspace(0, len(times) - 1, min(MOST_ROWS, len(times))).astype(int))
@@ -55,10 +57,10 @@ def _chart(
         "names": list(lines),
         "lines": packed(np.stack([values[rows] for values in lines.values()])),
         "levels": levels or [],
-        "bands": [list(band) for band in bands or []],
+        "bands": [list(interval) for interval in intervals or []],
         "isPaired": is_paired,
     }
 
 
-def _bands(found: list[list[tuple[float, float]]]) -> list[tuple[float, float]]:
-    return [band for each in found for band in each]
+def _intervals(of_cables: list[list[tuple[float, float]]]) -> list[tuple[float, float]]:
+    return [interval for each in of_cables for interval in each]
