@@ -1,0 +1,66 @@
+"""Limits of winches in plans of a family with its own proof, just beside demands that NumPy finds in dense rows."""
+
+import numpy as np
+import pytest
+
+import cspr_jax
+
+WINCH = {"drum_radius": 0.02, "gear_ratio": 3.0, "friction": 0.005, "efficiency": 0.9, "motor_inertia": 1e-5}
+SPOOLS = [[0.23, -0.13, 0.0], [-0.23, -0.13, 0.0], [0.0, 0.26, 0.0]]
+PLAN = {
+    "schema": 1,
+    "family": "hypocycloid-standard",
+    "z0": 1.4,
+    "robot": {"name": "test", "base_points": SPOOLS, "mass": 0.2, "winch": WINCH},
+    "pose": [{"rest": True}, {"position": [0.2, 0.1, 1.4], "arcs": 2}],
+}
+BESIDE = 1e-3
+
+
+def _segment(**limits):
+    plan = cspr_jax.plan(PLAN | ({"limits": limits} if limits else {}))
+    return plan, plan.to_dict()["segments"][0]
+
+
+@pytest.fixture(scope="module")
+def torques():
+    """Times, and torques of the motors from rates and tensions of the plan without limits, (n, 3)."""
+    plan, segment = _segment()
+    assert segment["verdict"] == "feasible"
+    rows = plan.rows(4000.0)
+    speed = -WINCH["gear_ratio"] * rows["rate"] / WINCH["drum_radius"]
+    side = np.sign(speed)
+    driven = rows["tension"] * WINCH["drum_radius"] / WINCH["gear_ratio"] / WINCH["efficiency"] ** side
+    inertia = WINCH["motor_inertia"] * np.gradient(speed, rows["t"], axis=0)
+    return rows["t"], driven + inertia + WINCH["friction"] * side
+
+
+def test_largest_torque(torques):
+    largest = np.abs(torques[1]).max(0)
+    _, kept = _segment(motor_torque_max=float(largest.max()) * (1.0 + BESIDE))
+    assert kept["verdict"] == "feasible"
+    _, refused = _segment(motor_torque_max=float(largest.max()) * (1.0 - BESIDE))
+    assert refused["verdict"] == "motor_over_torque"
+    assert refused["cause"][0]["cable"] == largest.argmax()
+
+
+def test_root_mean_square(torques):
+    times, values = torques
+    rms = float(np.sqrt(np.trapezoid(values**2, times, axis=0) / times[-1]).max())
+    assert _segment(motor_torque_rms_max=rms * (1.0 + BESIDE))[1]["verdict"] == "feasible"
+    assert _segment(motor_torque_rms_max=rms * (1.0 - BESIDE))[1]["verdict"] == "motor_over_torque_rms"
+
+
+@pytest.mark.thorough
+def test_cells_of_maps_equal_plans():
+    """Verdicts and numbers of arcs of three cells, which need 1, 2 and 2 arcs without the limit."""
+    usual, xs = {"amplitude": "quintic", "limits": {"motor_torque_max": 0.013}}, [0.02, 0.1, 0.2]
+    start = {"family": PLAN["family"], "amplitude": usual["amplitude"], "from": {"rest": True}, "max_arcs": 6}
+    axes = {"x": xs, "y": [0.1], "z": [1.4], "z0": [1.4]}
+    sweep = {"schema": 1, "map": "minimum-arcs", "robot": PLAN["robot"], "axes": axes, "trajectory": start}
+    cells = cspr_jax.compute_sweep(sweep | {"limits": usual["limits"]})
+    found = list(zip(cells["verdict"].values.ravel() == 0, cells["arcs"].values.ravel().tolist(), strict=True))
+    poses = [[{"rest": True}, {"position": [x, 0.1, 1.4]}] for x in xs]
+    plans = [cspr_jax.plan(PLAN | usual | {"pose": pose, "max_arcs": 6}) for pose in poses]
+    assert found == [(plan.feasible, plan.to_dict()["segments"][0]["arcs"] or 0) for plan in plans]
+    assert [arcs for _, arcs in found] != [1, 2, 2] and any(feasible for feasible, _ in found)
