@@ -75,7 +75,7 @@ def test_rows_in_json(own):
     assert written["rows"] == rows and (written["z_axis"], written["robot"]) == ("up", "lab triangle")
     assert written["feasible"] is True and written["units"] == found["units"]
     assert "rows" not in strict_json(cspr(*words, "--json", "-o", own / "out.csv")[1])
-    assert cspr(*words)[0] == 2 and "without -o or --json" in cspr(*words)[2]
+    assert cspr(*words)[0] == 2 and "without -o, --setpoints or --json" in cspr(*words)[2]
 
 
 def test_rows_of_what_is_not_feasible(own):
