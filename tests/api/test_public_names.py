@@ -89,6 +89,7 @@ def test_every_command_has_its_function():
         }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"names": "names"} if name == "robots" else {}
+        own |= {"robot": "reference"} if name == "anchors" else {}
         own |= {"sources": "given"} if name == "size" else {}
         known |= {"elastic"} if name == "replay" else set()  # a function of its own
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}

@@ -15,12 +15,15 @@ from cspr_jax.outputs.machine.firmware_anchors import FIRMWARE, anchors_of
 
 @checked()
 def anchors(
-    robot: str | Path, *, firmware: Literal["hangprinter", "klipper"] = "hangprinter", origin: Point = (0.0, 0.0, 0.0)
+    reference: str | Path,
+    *,
+    firmware: Literal["hangprinter", "klipper"] = "hangprinter",
+    origin: Point = (0.0, 0.0, 0.0),
 ) -> list[str]:
     """Write the anchors and drums of a robot as lines for the firmware of its controller.
 
     Args:
-        robot: the name of a robot of the catalogue, or the path of a robot file.
+        reference: the name of a robot of the catalogue, or the path of a robot file.
         firmware: "hangprinter", lines M669 and M666 for RepRapFirmware, or "klipper", sections of its kinematics winch.
         origin: point at which the machine is homed, in the axes of the robot file, m.
 
@@ -30,5 +33,5 @@ def anchors(
     Raises:
         ConfigError: a mistake in the file, a robot that does not move in space, or too many cables.
     """
-    robot_file = resolve_robot(str(robot), Path("robot"), Path())
+    robot_file = resolve_robot(str(reference), Path("robot"), Path())
     return FIRMWARE[firmware](anchors_of(robot_file, np.asarray(origin, float).tolist()))
