@@ -70,11 +70,10 @@ def compare(seed, kind, names=LIMITS, **how):
             limits = Limits(**within, **{name: limit * need * factor})
             proof = proof_of(Problem(robot, limits, None), motion, parts=MOTORS)  # type: ignore[arg-type]
             expected = "feasible" if factor > 1.0 else FLAGS[name]
-            # Where a layer begins the radius is an interval, which may leave a limit open just there; so may pulleys
-            # where tensions are chosen from ranges that a motor narrows.
+            # Where a layer begins the radius is an interval, which may leave a limit open just there; so may a choice
+            # of tensions from ranges that motors narrow.
             has_layers = robot.winches.layers is not None
-            may_be_open = has_layers or (is_redundant and robot.pulleys is not None)
-            is_open = may_be_open and proof.verdict.text == "undecided"
+            is_open = (has_layers or is_redundant) and proof.verdict.text == "undecided"
             assert is_open or proof.verdict.text == expected, (seed, kind, name, factor, need)
             compared += not is_open
             if factor < 1.0 and not is_redundant and not is_open:
