@@ -11,13 +11,14 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.checks import Check
+from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.api.plans import Plan, plan
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.reading import checked as checked_keys
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.errors.arguments import Kind, PictureSize, Positive
+from cspr_jax.errors.arguments import Kind, Positive
 from cspr_jax.machine.sizing import MotionDemands, holding_demands, joint_cycle, motor_demands, winding_curves
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.elementary import double_precision
@@ -47,7 +48,7 @@ SHOWN = ("motor_torque_max", "motor_speed_max", "motor_power_max", "motor_torque
 
 
 @dataclasses.dataclass(frozen=True)
-class Sizes:
+class Sizes(Pictured):
     """Peaks of the motors of a robot along motions, and the smallest motors that reach them.
 
     Fields:
@@ -88,42 +89,10 @@ class Sizes:
         """Smallest motors that do it, with the safety factor: (n,) by the names of the fields of the demands."""
         return {name: self.factor * worst(self.each.values(), name) for name in WITH_FACTOR}
 
-    @checked()
-    def plot(
-        self,
-        *,
-        size: PictureSize | None = None,
-        dpi: float | None = None,
-        font_size: float | None = None,
-        preset: str | None = None,
-        title: bool = True,
-        output: str | Path | None = None,
-    ) -> Figure:
-        """Draw winding torques over winding speeds of each motor, with lines and limits of the motors.
+    def _figure(self) -> Figure:
+        from cspr_jax.outputs.plots.machine.torque_speed import torque_speed_figure  # loads matplotlib
 
-        Args:
-            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
-            dpi: pixels per inch of a file; None: 160.
-            font_size: size of the font, points; None: 10.
-            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
-            title: whether the title is drawn.
-            output: picture to write; its ending selects the format. None: nothing is written.
-
-        Returns:
-            the figure of matplotlib.
-
-        Raises:
-            ConfigError: a size out of range, or an unknown picture format.
-            StoreError: the picture cannot be written.
-        """
-        from cspr_jax.api.files.pictures import finished  # loads matplotlib
-        from cspr_jax.outputs.plots.machine.torque_speed import torque_speed_figure
-        from cspr_jax.outputs.plots.style.style import style_of
-
-        def draw() -> Figure:
-            return torque_speed_figure(self.robot, self.curves, self.required, self.factor, self.limits)
-
-        return finished(draw, self.robot, style_of(size, dpi, font_size, preset, title=title), output)
+        return torque_speed_figure(self.robot, self.curves, self.required, self.factor, self.limits)
 
 
 @checked()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Annotated, Any
 
 import jax
@@ -11,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cspr_jax.api.arguments.checks import checked
-from cspr_jax.api.files.pictures import finished
+from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.api.files.replays import PlanOrFile
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.build.problems import build_problem
@@ -21,7 +20,7 @@ from cspr_jax.config.missing_cables import too_few, without_cables
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.curves.files import reference_of
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import Cables, Integer, PictureSize, Times
+from cspr_jax.errors.arguments import Cables, Integer, Times
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.machine.stops.candidates import ProvedStop
 from cspr_jax.machine.stops.fastest import ConsecutiveMotions, Emergency, fastest_stops
@@ -33,7 +32,6 @@ from cspr_jax.numerics.linear.frames import Frame, frame_of
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.outputs import stop_report
 from cspr_jax.outputs.plots.motions.stops import stops_figure
-from cspr_jax.outputs.plots.style.style import style_of
 from cspr_jax.robots.model.patterns import PATTERNS
 
 USUAL_COUNT = 50
@@ -43,40 +41,12 @@ InstantCount = Annotated[int, Integer(1, LARGEST_INSTANTS)]
 
 @with_suggestions
 @dataclasses.dataclass(frozen=True)
-class Stops(stop_report.StopsAlong):
+class Stops(Pictured, stop_report.StopsAlong):
     """Stops along a plan; see `cspr_jax.outputs.stop_report.StopsAlong` for the fields."""
 
-    @checked()
-    def plot(
-        self,
-        *,
-        size: PictureSize | None = None,
-        dpi: float | None = None,
-        font_size: float | None = None,
-        preset: str | None = None,
-        title: bool = True,
-        output: str | Path | None = None,
-    ) -> Figure:
-        """Draw the path of the plan with the paths of the stops, and the durations of the stops over time.
-
-        Args:
-            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
-            dpi: pixels per inch of a file; None: 160.
-            font_size: size of the font, points; None: 10.
-            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
-            title: whether the title is drawn.
-            output: picture to write; its ending selects the format. None: nothing is written.
-
-        Returns:
-            the figure of matplotlib.
-
-        Raises:
-            ConfigError: a size out of range, or an unknown picture format.
-            StoreError: the picture cannot be written.
-        """
-        style = style_of(size, dpi, font_size, preset, title=title)
+    def _figure(self) -> Figure:
         with double_precision():
-            return finished(lambda: stops_figure(self), self.plan.robot_file.name, style, output)
+            return stops_figure(self)
 
 
 @checked()

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cspr_jax.errors import StoreError, printable
+from cspr_jax.errors import ConfigError, StoreError, printable
 from cspr_jax.runtime import terminal
+from cspr_jax.store.files.publishing import check_writable
 
 
 class Command(NamedTuple):
@@ -46,6 +47,27 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
     """Add the option that names the file or folder to write."""
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
+
+
+def checked_picture(options: argparse.Namespace) -> dict[str, Any]:
+    """Options of style of a picture that -o names, refused before slow work where they or the file are wrong."""
+    if options.output is not None and not options.output.suffix:
+        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
+    check_writable(options.output)
+    from cspr_jax.outputs.plots.style.style import style_of  # loads matplotlib
+
+    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
+    style_of(**style)
+    return style
+
+
+def print_answer(answer: Any, *, as_json: bool) -> None:
+    """Print an answer as JSON, or its lines."""
+    if as_json:
+        print_json(answer.to_dict())
+        return
+    for line in answer.lines():
+        print_line(line)
 
 
 def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu: bool = True) -> None:

@@ -9,6 +9,7 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    checked_picture,
     prepare_jax,
     print_json,
     print_line,
@@ -18,7 +19,6 @@ from cspr_jax.cli.command import (
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
 from cspr_jax.runtime.progress import waiting
-from cspr_jax.store.files.publishing import check_writable
 
 
 def _add_size(parser: argparse.ArgumentParser) -> None:
@@ -45,15 +45,9 @@ def _add_size(parser: argparse.ArgumentParser) -> None:
 
 
 def _print_sizes(options: argparse.Namespace) -> int:
-    if options.output is not None and not options.output.suffix:
-        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     if not 0.0 < options.factor < float("inf"):
         raise ConfigError("--factor", f"{options.factor:g}: must be a number > 0")
-    check_writable(options.output)
-    from cspr_jax.outputs.plots.style.style import style_of
-
-    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**style)  # refuse bad options before slow work
+    style = checked_picture(options)
     with waiting():
         prepare_jax(options, quick=True)
         from cspr_jax.api.checks import check_file

@@ -11,7 +11,9 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    checked_picture,
     prepare_jax,
+    print_answer,
     print_json,
     print_line,
     print_table,
@@ -283,17 +285,12 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    if options.output is not None and not options.output.suffix:
-        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     if options.output is not None and options.elastic:
         raise ConfigError("-o", "must be absent with --elastic, which has no picture")
     _check_step(options)
-    check_writable(options.output)
+    style = checked_picture(options)
     from cspr_jax.outputs.mujoco.module import need_mujoco
-    from cspr_jax.outputs.plots.style.style import style_of
 
-    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**style)  # refuse bad options before slow work
     need_mujoco()
     plan = _planned(options)
     if not (plan.feasible or options.anyway):
@@ -309,11 +306,7 @@ def _replay(options: argparse.Namespace) -> int:
             played = replay(plan, anyway=True, **of_step)
         if options.output is not None:
             played.plot(output=options.output, **style)
-    if options.json:
-        print_json(played.to_dict())
-    else:
-        for line in played.lines():
-            print_line(line)
+    print_answer(played, as_json=options.json)
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 

@@ -9,15 +9,14 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    checked_picture,
     prepare_jax,
-    print_json,
-    print_line,
+    print_answer,
     warn,
 )
-from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.errors import ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
 from cspr_jax.runtime.progress import waiting
-from cspr_jax.store.files.publishing import check_writable
 
 NUMBERS = {
     "rate": ("HZ", "ticks of the controller a second (default 1000)"),
@@ -46,14 +45,9 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
 
 
 def _simulate(options: argparse.Namespace) -> int:
-    if options.output is not None and not options.output.suffix:
-        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
-    check_writable(options.output)
+    style = checked_picture(options)
     from cspr_jax.outputs.mujoco.module import need_mujoco
-    from cspr_jax.outputs.plots.style.style import style_of
 
-    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**style)  # refuse bad options before slow work
     need_mujoco()
     prepare_jax(options)
     names = [*NUMBERS, "seed"]
@@ -69,11 +63,7 @@ def _simulate(options: argparse.Namespace) -> int:
         simulation = simulate(planned, anyway=True, **settings)
         if options.output is not None:
             simulation.plot(output=options.output, **style)
-    if options.json:
-        print_json(simulation.to_dict())
-    else:
-        for line in simulation.lines():
-            print_line(line)
+    print_answer(simulation, as_json=options.json)
     return ExitCode.DONE if planned.feasible else ExitCode.NOT_FEASIBLE
 
 

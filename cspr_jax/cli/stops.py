@@ -9,6 +9,7 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    checked_picture,
     prepare_jax,
     print_json,
     print_table,
@@ -17,7 +18,6 @@ from cspr_jax.cli.command import (
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
 from cspr_jax.runtime.progress import waiting
-from cspr_jax.store.files.publishing import check_writable
 
 LARGEST_INSTANTS = 10_000
 
@@ -38,15 +38,9 @@ def _add_stops(parser: argparse.ArgumentParser) -> None:
 
 
 def _print_stops(options: argparse.Namespace) -> int:
-    if options.output is not None and not options.output.suffix:
-        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     if not 1 <= options.instants <= LARGEST_INSTANTS:
         raise ConfigError("--instants", f"{options.instants}: must be a whole number from 1 to {LARGEST_INSTANTS}")
-    check_writable(options.output)
-    from cspr_jax.outputs.plots.style.style import style_of
-
-    style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
-    style_of(**style)  # refuse bad options before slow work
+    style = checked_picture(options)
     with waiting():
         prepare_jax(options, quick=True)
         from cspr_jax.api import plans

@@ -83,6 +83,11 @@ class StopsAlong:
     left: str = ""
 
     @property
+    def robot(self) -> str:
+        """Name of the robot."""
+        return self.plan.robot_file.name
+
+    @property
     def all_found(self) -> bool:
         """Tell whether there is a proved stop from every instant."""
         return all(stop.is_found for stop in self.stops)
@@ -118,7 +123,7 @@ class StopsAlong:
         """
         return {
             "schema": SCHEMA,
-            "robot": self.plan.robot_file.name,
+            "robot": self.robot,
             "without": list(self.without) or None,
             "left": self.left or None,
             "z_axis": self.plan.robot_file.z_axis,
@@ -157,7 +162,7 @@ class StopsAlong:
         """
         from rich.table import Table  # only a terminal needs it
 
-        title = f"{self.plan.robot_file.name}: stops{self._gone}"
+        title = f"{self.robot}: stops{self._gone}"
         table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
         table.caption = cell(*self.lines(), style="table.caption")
         for head in ("from t (s)", "duration (s)", "rest at (m)", "margin (N)", "kind"):

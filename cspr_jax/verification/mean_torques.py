@@ -1,8 +1,9 @@
 """Root mean squares of the torques of motors over a full motion, or over several that follow each other, by proof.
 
 Over a block, a torque lies within rho of a line m + l s, so that its square has the integral m^2 + l^2 / 3 over a unit
-of time, to 2 (|m| + |l|) rho + rho^2; where friction may act on both sides, the square lies between the smallest and
-the largest one of both. Blocks whose bounds are widest are halved until each limit is decided.
+of time, to 2 (|m| + |l|) rho + rho^2; where friction may act on both sides, or the drum has two radii, the square lies
+between the smallest and the largest one of these cases. Blocks whose bounds are widest are halved until each limit is
+decided.
 """
 
 from __future__ import annotations
@@ -127,12 +128,12 @@ def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array
         torque = torque_bounds(cast("Winches", robot.winches), motors, tensions.tension)
         may_act = motors.may_act()
         low, high = _squares(torque)
-        one_side = _mean_square(torque)
-        is_mixed = may_act.all(0)
+        one_case = _mean_square(torque)
+        is_mixed = jnp.sum(may_act, axis=0) > 1
         smallest = jnp.min(jnp.where(may_act, low, jnp.inf), axis=0)
         largest = jnp.max(jnp.where(may_act, high, -jnp.inf), axis=0)
-        of_side = (jnp.sum(jnp.where(may_act, side, 0.0), axis=0) for side in one_side)
-        low, high = (jnp.where(is_mixed, *pair) for pair in zip((smallest, largest), of_side, strict=True))
+        of_case = (jnp.sum(jnp.where(may_act, side, 0.0), axis=0) for side in one_case)
+        low, high = (jnp.where(is_mixed, *pair) for pair in zip((smallest, largest), of_case, strict=True))
         return jnp.where(low > 0.0, low, 0.0), jnp.where(high >= 0.0, high, jnp.inf)
 
     return jax.vmap(one)(states)

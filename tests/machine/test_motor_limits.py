@@ -70,27 +70,26 @@ def compare(seed, kind, names=LIMITS, **how):
             limits = Limits(**within, **{name: limit * need * factor})
             proof = proof_of(Problem(robot, limits, None), motion, parts=MOTORS)  # type: ignore[arg-type]
             expected = "feasible" if factor > 1.0 else FLAGS[name]
-            # Where a layer begins the radius is an interval, which may leave a limit open just there; so may a choice
-            # of tensions from ranges that motors narrow.
-            has_layers = robot.winches.layers is not None
-            is_open = (has_layers or is_redundant) and proof.verdict.text == "undecided"
+            # A choice of tensions from ranges that motors narrow may stay open so near a limit.
+            is_open = is_redundant and proof.verdict.text == "undecided"
             assert is_open or proof.verdict.text == expected, (seed, kind, name, factor, need)
             compared += not is_open
             if factor < 1.0 and not is_redundant and not is_open:
                 reached = attained(Problem(robot, limits, None), motion, proof)  # type: ignore[arg-type]
-                loose = 1e-3 if has_layers else 1e-4
-                _check_cause(reached, motors, name, need, factor, float(case.samples["times"][0]), loose)
+                _check_cause(reached, motors, name, need, factor, start=float(case.samples["times"][0]))
     return compared
 
 
-def _check_cause(proof, motors, name, need, factor, start, loose):
+def _check_cause(proof, motors, name, need, factor, start):
     """The worst motor is one that needs most, and the failing intervals hold times at which it fails."""
     times = np.array([time for intervals in proof.proof.failing for time in intervals.mean(1)]) + start
     # At the ends of a motion, and where a winch turns back, both sides of friction count.
     assert (motors.needs(name, times) > need * factor * (1.0 - 1e-9)).all()
     worst = int(np.argmin(proof.proof.high / proof.scales))
     row = proof.criteria[worst]
-    assert row.value(float(proof.proof.high[worst])) / row.allowed == pytest.approx(1.0 / factor, rel=loose)
+    # Samples may miss the time at which a layer begins, and with it some of what the motor needs.
+    missed = 1e-4 if motors.winch.get("layer_turns") is None else BESIDE
+    assert row.value(float(proof.proof.high[worst])) / row.allowed == pytest.approx(1.0 / factor, rel=missed)
 
 
 def test_spatial_point_mass():

@@ -11,10 +11,10 @@ from typing import Annotated, Any
 from matplotlib.figure import Figure
 
 from cspr_jax.api.arguments.checks import checked
-from cspr_jax.api.files.pictures import finished
+from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.errors import ConfigError
-from cspr_jax.errors.arguments import Kind, PictureSize
+from cspr_jax.errors.arguments import Kind
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.mujoco import elastic_replay
@@ -23,7 +23,6 @@ from cspr_jax.outputs.mujoco.elastic_replay import ElasticPlan
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.outputs.plots.films.replay import replay_figure
-from cspr_jax.outputs.plots.style.style import style_of
 
 PlanOrFile = Annotated[
     str | Path | Mapping[str, Any] | Plan,
@@ -33,40 +32,11 @@ PlanOrFile = Annotated[
 
 @with_suggestions
 @dataclasses.dataclass(frozen=True)
-class Replay(replays.PlayedPlan):
+class Replay(Pictured, replays.PlayedPlan):
     """A plan, and its motion as played by MuJoCo; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
 
-    @checked()
-    def plot(
-        self,
-        *,
-        size: PictureSize | None = None,
-        dpi: float | None = None,
-        font_size: float | None = None,
-        preset: str | None = None,
-        title: bool = True,
-        output: str | Path | None = None,
-    ) -> Figure:
-        """Draw planned and played path, and the deviations of path and tensions over time.
-
-        Args:
-            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
-            dpi: pixels per inch of a file; None: 160.
-            font_size: size of the font, points; None: 10.
-            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
-            title: whether the title is drawn.
-            output: picture to write; its ending selects the format. None: nothing is written.
-
-        Returns:
-            the figure of matplotlib.
-
-        Raises:
-            ConfigError: a size out of range, or an unknown picture format.
-            StoreError: the picture cannot be written.
-        """
-        return finished(
-            lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size, preset, title=title), output
-        )
+    def _figure(self) -> Figure:
+        return replay_figure(self)
 
 
 @checked()

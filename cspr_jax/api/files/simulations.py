@@ -3,63 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from cspr_jax.api.arguments.checks import checked
-from cspr_jax.api.files.pictures import finished
+from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.api.files.replays import PlanOrFile
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import NotNegative, NotNegativeOrNone, PictureSize, Positive, Seed
+from cspr_jax.errors.arguments import NotNegative, NotNegativeOrNone, Positive, Seed
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.mujoco import simulation
 from cspr_jax.outputs.mujoco.closed_loop import Loop
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.plots.films.simulation import simulation_figure
-from cspr_jax.outputs.plots.style.style import style_of
 
 DEFAULT = Loop()
 
 
 @with_suggestions
 @dataclasses.dataclass(frozen=True)
-class Simulation(simulation.Simulated):
+class Simulation(Pictured, simulation.Simulated):
     """A plan, and its motion as winches drive it; see `cspr_jax.outputs.mujoco.simulation.Simulated` for the fields."""
 
-    @checked()
-    def plot(
-        self,
-        *,
-        size: PictureSize | None = None,
-        dpi: float | None = None,
-        font_size: float | None = None,
-        preset: str | None = None,
-        title: bool = True,
-        output: str | Path | None = None,
-    ) -> Figure:
-        """Draw planned and driven path, and the error of position, tensions and torques over time.
-
-        Args:
-            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
-            dpi: pixels per inch of a file; None: 160.
-            font_size: size of the font, points; None: 10.
-            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
-            title: whether the title is drawn.
-            output: picture to write; its ending selects the format. None: nothing is written.
-
-        Returns:
-            the figure of matplotlib.
-
-        Raises:
-            ConfigError: a size out of range, or an unknown picture format.
-            StoreError: the picture cannot be written.
-        """
-        return finished(
-            lambda: simulation_figure(self), self.robot, style_of(size, dpi, font_size, preset, title=title), output
-        )
+    def _figure(self) -> Figure:
+        return simulation_figure(self)
 
 
 @checked()
