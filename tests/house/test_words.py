@@ -27,11 +27,10 @@ slope still stops stored stretch surroundings taken telling track tracks turned 
 PUBLIC = {
     "api/families/platform_searches.py": {"place"},
     "api/files/imports.py": {"keys"},
+    "api/files/pictured.py": {"size"},
     "api/files/pictures.py": {"size"},
-    "api/files/replays.py": {"size"},
-    "api/files/simulations.py": {"size"},
     "api/sizing.py": {"size"},
-    "api/stops.py": {"Stops", "instants", "size", "stops"},
+    "api/stops.py": {"Stops", "instants", "stops"},
     "config/keys/obstacles.py": {"size"},
     "config/keys/trajectory.py": {"beat"},
     "config/plan.py": {"least", "stretch"},
