@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import jax
 import numpy as np
-from matplotlib.figure import Figure
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.files.pictured import Pictured
@@ -25,14 +24,17 @@ from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.machine.stops.candidates import ProvedStop
 from cspr_jax.machine.stops.fastest import ConsecutiveMotions, Emergency, fastest_stops
 from cspr_jax.machine.stops.instants import BACK
+from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame, frame_of
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.outputs import stop_report
-from cspr_jax.outputs.plots.motions.stops import stops_figure
 from cspr_jax.robots.model.patterns import PATTERNS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 USUAL_COUNT = 50
 LARGEST_INSTANTS = 10_000
@@ -45,6 +47,8 @@ class Stops(Pictured, stop_report.StopsAlong):
     """Stops along a plan; see `cspr_jax.outputs.stop_report.StopsAlong` for the fields."""
 
     def _figure(self) -> Figure:
+        from cspr_jax.outputs.plots.motions.stops import stops_figure  # loads matplotlib
+
         with double_precision():
             return stops_figure(self)
 
@@ -60,7 +64,8 @@ def stops(
     """Find the fastest proved stop from each of some instants of a plan.
 
     A stop begins with position, velocity and acceleration of the instant and ends at rest; all cables stay taut and all
-    limits of the plan are kept. After cables have broken the acceleration may jump at the start, since tensions do.
+    limits of the plan are kept, by proof. Plans with `motor_torque_rms_max` or feeds of G-code are refused: these are
+    not proved of stops. After cables have broken the acceleration may jump at the start, since tensions do.
 
     Args:
         given: a feasible plan, a plan file, or a dictionary, as for `plan`.
@@ -72,9 +77,9 @@ def stops(
         a stop for each instant, or that none was found, which proves nothing.
 
     Raises:
-        ConfigError: the plan has a mistake, is not feasible, launches an object, or has an uncertainty; or there are no
-            such cables.
-        InputError: times outside of the plan.
+        ConfigError: the plan has a mistake, is not feasible, launches an object, or has an uncertainty or feeds; or
+            there are no such cables.
+        InputError: times outside of the plan, or a plan with `motor_torque_rms_max`.
     """
     planned = given if isinstance(given, Plan) else plan(given)
     _check(planned)
@@ -85,10 +90,9 @@ def stops(
     gone = tuple(sorted({int(i) for i in without or ()}))
     with double_precision():
         robot_file, left = _left(planned, gone, list(without or ()))
-        if left:
-            none = tuple(_none(time) for time in at.tolist())
-            return Stops(planned, none, gone, left)
-        emergency = _emergency(planned, robot_file, jumps=bool(gone))
+        emergency = None if left else _emergency(planned, robot_file, jumps=bool(gone))
+        if isinstance(emergency, str) or emergency is None:
+            return Stops(planned, tuple(_none(time) for time in at.tolist()), gone, left or str(emergency))
         motions = [motion for leg in planned.legs for motion in leg.motions]
         sequence = ConsecutiveMotions(
             motions, planned.answers.duration, planned.frame, _reference(planned.robot_file, planned)
@@ -109,26 +113,42 @@ def _check(planned: Plan) -> None:
         raise ConfigError(NAME, "its motion is too long to be held: must be a shorter one")
     if planned.problem.limits.uncertainty is not None:
         raise ConfigError(NAME, "uncertainty: must be absent in a plan that is to be stopped: stops are proved without")
+    check_no_means(planned.problem.limits, f"{NAME}: ")
+    if any(feeds is not None for feeds in planned.feeds):
+        raise ConfigError(NAME, "feeds: must be absent in a plan that is to be stopped: stops are proved without")
 
 
 def _left(planned: Plan, gone: tuple[int, ...], broken: list[int]) -> tuple[RobotFile, str]:
     # The robot without the cables that break, and what is left where there are too few, or none that can be used.
     if not gone:
         return planned.robot_file, ""
-    before = planned.robot_file.missing_cables
-    full = planned.robot_file.full
-    count, both = len(full.base_points), [*before, *broken]
-    if len(set(both)) == len(both) and max(both) < count and count - len(both) < PATTERNS[full.own_pattern].dof:
+    full, both = planned.robot_file.full, [*planned.robot_file.missing_cables, *broken]
+    count = len(full.base_points)
+    are_cables = len(set(both)) == len(both) and min(both) >= 0 and max(both) < count
+    if are_cables and count - len(both) < PATTERNS[full.own_pattern].dof:
         return full, f"{too_few(full, count - len(both))}; {stop_report.NONE}"
-    return without_cables(full, both, NAME), ""
+    try:
+        return without_cables(full, both, NAME), ""
+    except ConfigError as error:
+        if not are_cables:
+            raise
+        return full, _nothing_left(error)
 
 
-def _emergency(planned: Plan, robot_file: RobotFile, *, jumps: bool) -> Emergency:
+def _nothing_left(error: ConfigError) -> str:
+    return f"{str(error).removeprefix(f'{NAME}: ')}; {stop_report.NONE}"
+
+
+def _emergency(planned: Plan, robot_file: RobotFile, *, jumps: bool) -> Emergency | str:
+    # The robot that stops, or why one without its cables cannot be used.
     spec, frame = planned.keys, planned.frame
     problem: Problem = planned.problem
     if jumps:
         frame = frame_of(robot_file.base_points, robot_file.z_axis)
-        problem = build_problem(robot_file, spec, spec, NAME, epsilon=0.2, any_cables=True, pulleys=True)
+        try:
+            problem = build_problem(robot_file, spec, spec, NAME, epsilon=0.2, any_cables=True, pulleys=True)
+        except ConfigError as error:
+            return _nothing_left(error)
     scene = scene_of(problem.robot, robot_file, frame, spec, NAME, trajectory=spec)
     return Emergency(problem, scene, frame, _reference(robot_file, planned), _depth(planned, frame), jumps)
 

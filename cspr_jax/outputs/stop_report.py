@@ -62,8 +62,12 @@ class PlannedStop:
         """The stop in words."""
         if not self.is_found:
             return f"from t = {self.time:.4g} s: {NONE}"
-        position = ", ".join(f"{value + 0.0:.4g}" for value in np.round(self.position, 9))
-        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at ({position}), {KINDS[self.kind]}"
+        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at {self.place}, {KINDS[self.kind]}"
+
+    @property
+    def place(self) -> str:
+        """The position at rest in words."""
+        return f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(self.position, 9))})"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +132,7 @@ class StopsAlong:
             "left": self.left or None,
             "z_axis": self.plan.robot_file.z_axis,
             "stops": [stop.to_dict() for stop in self.stops],
-            "longest": finite(float(np.max(self.durations, initial=0.0, where=~np.isnan(self.durations)))),
+            "longest": max((stop.duration for stop in self.stops if stop.is_found), default=None),
             "none_found": self.intervals_without,
             "all_found": self.all_found,
         }
@@ -168,11 +172,8 @@ class StopsAlong:
         for head in ("from t (s)", "duration (s)", "rest at (m)", "margin (N)", "kind"):
             table.add_column(cell(head), justify="left" if head in ("rest at (m)", "kind") else "right")
         for stop in self.stops:
-            position = (
-                f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(stop.position, 9))})" if stop.is_found else ""
-            )
             numbers = (
-                [f"{stop.duration:.4g}", position, f"{stop.margin:.3g}", KINDS[stop.kind]]
+                [f"{stop.duration:.4g}", stop.place, f"{stop.margin:.3g}", KINDS[stop.kind]]
                 if stop.is_found
                 else ["", "", "", NONE]
             )

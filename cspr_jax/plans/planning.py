@@ -135,6 +135,11 @@ class PlannedMotions:
         return {name: values for result in self.outcomes for name, values in result.columns().items()}
 
     @property
+    def feeds(self) -> list[np.ndarray | None]:
+        """Largest speeds on the pieces of each motion, of G-code and the like; None: a motion keeps none."""
+        return [getattr(proof, "feeds", None) for leg in self.legs for proof in leg.answers.proof]
+
+    @property
     def feasible(self) -> bool:
         """Tell whether every segment is proved feasible."""
         return bool(self.is_feasible.all())

@@ -81,7 +81,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     problem = plan.problem
     scene = scene_of(problem.robot, plan.robot_file, plan.frame, plan.keys, path, trajectory=plan.keys)
     try:
-        paths = retraced(problem.robot, motions, grid, _feeds(plan))
+        paths = retraced(problem.robot, motions, grid, plan.feeds)
     except InputError as error:
         raise ConfigError(path, f"retime: {error}") from error
     faster = _fastest(plan, paths, grid, ramp_time)
@@ -98,11 +98,6 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
     lines += answers.notes("retime: ramp_time")
     return with_motions(plan, with_attained(plan.problem, answers, chosen, scene), chosen, lines, scene)
-
-
-def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:
-    # Return the feeds that each motion of a plan keeps.
-    return [getattr(proof, "feeds", None) for leg in plan.legs for proof in leg.answers.proof]
 
 
 def _feeds_along(faster: Sequence[_Faster], count: int) -> list[np.ndarray | None]:
@@ -182,7 +177,7 @@ def _with_planned(
     # Replace answers by those of the planned motions in `rows`; a motion that its family has proved stays feasible.
     if not len(rows):
         return answers
-    feeds = _feeds(plan)
+    feeds = plan.feeds
     others = proved_answers(plan.problem, [motions[i] for i in rows], scene, [feeds[i] for i in rows])
     answers = replaced(answers, rows, others, np.arange(len(rows)))
     answers.verdict[rows] = np.where(plan.is_feasible[rows], 0, answers.verdict[rows])

@@ -105,7 +105,7 @@ def test_stops_of_a_planar_robot(planar, tmp_path):
 def test_too_few_cables_say_what_is_left(planar):
     found = cspr_jax.stops(planar, instants=2, without=[0])
     assert not found.all_found and found.lines() == [found.left] and "swings below one spool" in found.left
-    assert found.to_dict()["none_found"] == [[found.times[0], found.times[1]]]
+    assert found.to_dict()["none_found"] == [[found.times[0], found.times[1]]] and found.to_dict()["longest"] is None
     assert all(stop.to_dict()["kind"] is None for stop in found.stops)
 
 
@@ -233,6 +233,24 @@ def test_a_command_says_that_none_is_left(tmp_path):
 def test_times_and_plans_are_checked(planar):
     with pytest.raises(cspr_jax.errors.InputError, match=r"between 0 and .*, the duration of the plan"):
         cspr_jax.stops(planar, times=[1e3])
+    robot = planar.keys.robot | {"winch": {"drum_radius": 0.02}}
+    spec = {"schema": 1, "family": "spline", "interpolation": "quintic", "robot": robot, "motor_torque_rms_max": 50.0}
+    pose = [{"position": [x, 0.0, 1.2], "time": time} for x, time in ((0.0, 0.0), (0.1, 2.0))]
+    bounded = cspr_jax.plan(spec | {"pose": pose})
+    assert bounded.feasible
+    with pytest.raises(cspr_jax.errors.InputError, match=r"^plan: motor_torque_rms_max = \[50.0\]: must be absent"):
+        cspr_jax.stops(bounded)
+
+
+def test_a_robot_that_is_of_no_use_without_a_cable_has_no_stop(tmp_path):
+    """Without one cable of four the spools that are left lie on one line: no stop, but no mistake of the caller."""
+    robot = 'robot = { name = "q", mass = 1, base_points = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [0, 0, 0]] }'
+    motion = "pose = [{ position = [-0.2, 0.3, 1.2], time = 0 }, { position = [-0.3, 0.4, 1.2], time = 2 }]"
+    (tmp_path / "p.toml").write_text(f'schema = 1\nfamily = "spline"\n{robot}\n{motion}\ntension_max = 30\n')
+    code, out, err = cspr("stops", tmp_path / "p.toml", "--without", "1", "--instants", "2", "--json")
+    found = strict_json(out)
+    assert (code, err, found["longest"]) == (1, "", None) and [row["kind"] for row in found["stops"]] == [None, None]
+    assert found["left"].startswith("robot.base_points = ") and "not on one line" in found["left"]
 
 
 @pytest.mark.thorough

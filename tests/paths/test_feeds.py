@@ -7,6 +7,7 @@ import pytest
 
 import cspr_jax
 from cspr_jax.curves.spline import Spline
+from cspr_jax.errors import ConfigError
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
@@ -69,6 +70,11 @@ def test_feeds_are_kept_between_nodes(planned):
     assert segment["verdict"] == "feasible"
     fast, behind, rapid = excess(planned)
     assert 0.99 < behind < 1.0 and fast < 1.0 and rapid == 0.0
+
+
+def test_stops_refuse_feeds(planned):
+    with pytest.raises(ConfigError, match="feeds: must be absent in a plan that is to be stopped"):
+        cspr_jax.stops(planned)
 
 
 def test_feeds_are_named(planned):
