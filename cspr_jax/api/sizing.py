@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import jax
 import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
@@ -14,6 +15,7 @@ from cspr_jax.api.checks import Check
 from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.api.plans import Plan, plan
 from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.config.reading import checked as checked_keys
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import SweepFile
@@ -114,15 +116,15 @@ def size(given: PlansOrResults, *, factor: Positive = FACTOR) -> Sizes:
         ConfigError: a robot without winches, other robots or winches, a plan without a finite motion, a map of
             another kind, or a mistake in a file.
     """
-    single = isinstance(given, str | Path | Mapping | Plan | Check) or hasattr(given, "axes")
-    sources: list[Any] = [given] if single else list(given)  # type: ignore[arg-type]
+    is_single = isinstance(given, str | Path | Mapping | Plan | Check) or hasattr(given, "axes")
+    sources: list[Any] = [given] if is_single or not isinstance(given, Sequence) else list(given)
     if not sources:
         raise ConfigError("given", "[]: must be one plan or result, or more")
     with double_precision():
         items = [_source(one, k) for k, one in enumerate(sources)]
         first = items[0]
         for other in items[1:]:
-            if other.robot_file.winch != first.robot_file.winch:
+            if not _are_same(other.robot, first.robot):
                 raise ConfigError(other.name, f"must have the winches of {first.name}: sizes are of one machine")
         names = [_unique(source.name, [other.name for other in items[:k]]) for k, source in enumerate(items)]
         each = {name: source.peaks() for name, source in zip(names, items, strict=True)}
@@ -155,7 +157,11 @@ class _Motions:
 
     def peaks(self) -> MotionDemands:
         samples = self.plan.demands.samples.tolist()
-        return motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
+        demands = motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
+        integrals = np.stack([demands.torque_rms, demands.energy, demands.regenerated_energy])
+        if not np.isfinite(integrals).all():
+            raise ConfigError(self.name, "must be another motion: torques are infinite, or jump too often for a mean")
+        return demands
 
     def curves(self) -> dict[str, np.ndarray]:
         speed, torque = winding_curves(self.robot, self.limits, self._motions, self.plan.keys.tension_rule)
@@ -198,6 +204,12 @@ def _unique(name: str, earlier: list[str]) -> str:
     return f"{name} ({earlier.count(name) + 1})" if name in earlier else name
 
 
+def _are_same(one: AnyRobot, other: AnyRobot) -> bool:
+    # Tell whether two robots have the same number of cables on the same winches, however their files write them.
+    leaves, kinds = zip(*(jax.tree.flatten(robot.winches) for robot in (one, other)), strict=True)
+    return one.n_cables == other.n_cables and kinds[0] == kinds[1] and all(map(np.array_equal, *leaves))
+
+
 def _check_winches(robot_file: RobotFile, name: str) -> None:
     if robot_file.winch is None:
         raise ConfigError(name, f"robot {robot_file.name}: must have [winch]: motors are sized for its drums")
@@ -211,6 +223,9 @@ def _workspace(result: Result, name: str) -> _StaticPoses:
     spec = checked_keys(SweepFile, settings, Path(name))
     if not {"static", "wrench-feasible"} & set(spec.workspace.conditions if spec.workspace else ()):
         raise ConfigError(name, 'workspace.conditions: must hold "static" or "wrench-feasible": poses that cables hold')
+    if spec.without == ANY_ONE:
+        allowed = "must be absent or list cables: motors are sized for one robot"
+        raise ConfigError(name, f'without = "{ANY_ONE}": {allowed}')
     patterns = [MAP_KINDS["workspace"].patterns]
     robot_file = as_moved(resolve_robot(spec.robot, Path(name), Path()), patterns, spec.without, Path(name))
     _check_winches(robot_file, name)

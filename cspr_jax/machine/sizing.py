@@ -36,6 +36,10 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 BATCH = 512  # number of times computed at once
 TOLERANCE = 1e-8  # relative, of integrals over time
 RESTS = 1e-12  # rad/s, below which integrals take a motor for resting
+# Rates below this fraction of the fastest cable's are rounding, as on a path about a spool: their motor rests.
+NOISE = 1e-11
+# Integrals of a motor are exact to the tolerance, or to the tolerance times this fraction of the largest motor's.
+FLOOR = 1e-6
 CURVE = 400  # number of times along a motion in a picture
 
 
@@ -68,7 +72,7 @@ class MotionDemands:
 def winding_states(
     robot: AnyRobot, limits: Limits, motion: Motion, tau: Float[Array, "k"], *, rule: str
 ) -> tuple[Float[Array, "k n"], Float[Array, "k n"], Float[Array, "k n"]]:
-    """Winding speeds, winding torques, at standstill the one of larger magnitude, and those that integrals take."""
+    """Winding speeds, 0 where they are rounding, winding torques, and those that integrals take at standstill."""
     drums, _ = drums_and_motors(robot, limits, motion, tau, rule=rule)
     return jax.vmap(partial(_worse, robot.winches))(*drums)
 
@@ -82,8 +86,10 @@ def _worse(winches: Any, length: Array, rate: Array, acceleration: Array, tensio
         jnp.where(jnp.abs(winding) >= jnp.abs(paying), winding, paying),
         jnp.where(speed > 0, winding, paying),
     )
-    torque, integrand = (jnp.where(jnp.abs(speed) <= slowest, static, moving) for slowest in (STANDSTILL, RESTS))
-    return speed, torque, integrand
+    rounding = jnp.maximum(RESTS, winches.gear_ratio / radius * NOISE * jnp.max(jnp.abs(rate)))
+    rests = jnp.abs(speed) <= rounding
+    torque = jnp.where(rests | (jnp.abs(speed) <= STANDSTILL), static, moving)
+    return jnp.where(rests, 0.0, speed), torque, jnp.where(rests, static, moving)
 
 
 @partial(jax.jit, static_argnames=("rule",))
@@ -126,6 +132,7 @@ def motor_demands(
             return in_batches(of_motion, tau, batch_size=BATCH)
 
         largest.append(_largest(states, sample_times(motion, count)))
+        floor = FLOOR * _floors(largest[-1])
         length = float(motion.duration())
         edges = np.concatenate([[0.0], np.asarray(motion.breaks(), float), [1.0]])
 
@@ -133,7 +140,7 @@ def motor_demands(
             speed, _, torque = states(tau)
             return _integrands(speed, torque)
 
-        sums.append(length * integrals(integrands, edges, TOLERANCE))
+        sums.append(length * integrals(integrands, edges, TOLERANCE, floor))
         duration += length
     n = robot.n_cables
     square, energy, regenerated = np.sum(sums, axis=0).reshape(3, n)
@@ -154,6 +161,12 @@ def _largest(states, tau: np.ndarray) -> np.ndarray:
 def _integrands(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     power = torque * speed
     return np.concatenate([torque**2, power.clip(min=0.0), (-power).clip(min=0.0)], axis=-1)
+
+
+def _floors(largest: np.ndarray) -> np.ndarray:
+    # Largest integrands of any motor, in the order of `_integrands`.
+    torque, speed = np.max(largest.reshape(4, -1)[:2], axis=1)
+    return np.repeat([torque**2, torque * speed, torque * speed], len(largest) // 4)
 
 
 def winding_curves(

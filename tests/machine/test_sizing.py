@@ -135,6 +135,60 @@ def test_integrals_of_functions_with_jumps_and_kinks():
     np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-15)
 
 
+def test_integrals_of_rounding_noise_end():
+    counts = []
+
+    def functions(x):
+        counts.append(x.size)
+        noise = 1e-17 * np.sin(1e12 * x)
+        return np.stack([noise, 1.0 + noise, 1e-3 * np.exp(x)], axis=1)
+
+    found = integrals(functions, np.array([0.0, 1.0]), 1e-9, floor=np.full(3, 1e-6))
+    np.testing.assert_allclose(found, [0.0, 1.0, 1e-3 * (np.e - 1.0)], rtol=1e-9, atol=1e-15)
+    assert sum(counts) < 1000
+    endless = integrals(lambda x: np.stack([np.sin(1e12 * x), x], axis=1), np.array([0.0, 1.0]), 1e-9)
+    assert np.isnan(endless[0]) and endless[1] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_a_motor_whose_cable_keeps_its_length_holds_it(tmp_path):
+    """On a level circle about the vertical line through a spool its cable has one length, and its rate is rounding."""
+    keys = {"drum_radius": 0.02, "gear_ratio": 5.0, "efficiency": 0.9, "friction": 0.01, "motor_inertia": 1e-5}
+    spools = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]
+    robot = {"name": "circle", "mass": 1.0, "base_points": spools, "winch": keys}
+    circle = {"centre": [0.0, 0.0, 1.3], "radius": 0.2, "frequency": 0.5}
+    found = cspr_jax.size({"schema": 1, "family": "ellipse", "robot": robot, "ellipse": circle}).joint
+    angle = np.linspace(0.0, 2.0 * np.pi, 401)[:-1]
+    turning = 0.2 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    away = np.array(spools) - (turning + np.array([0.0, 0.0, 1.3]))[:, None]
+    lengths = np.linalg.norm(away, axis=2, keepdims=True)
+    force = -0.25 * turning - np.array([0.0, 0.0, 9.81])
+    tensions = np.linalg.solve(np.swapaxes(away / lengths, 1, 2), force[..., None])[:, 0, 0]
+    load = 0.02 * tensions / 5.0
+    torque = np.maximum(load / 0.9 + 0.01, np.abs(load * 0.9 - 0.01))
+    assert (found.speed[0], found.energy[0], found.regenerated_energy[0]) == (0.0, 0.0, 0.0) and found.speed[1] > 10.0
+    # Equidistant samples of a periodic function integrate it.
+    assert found.torque_rms[0] == pytest.approx(np.sqrt(np.mean(torque**2)), rel=1e-9)
+    assert found.torque[0] == pytest.approx(torque.max(), rel=1e-6)
+
+
+def test_sizes_are_of_one_robot(tmp_path):
+    robot = """{ name = "four", mass = 1, base_points = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0.1]],
+  winch = { drum_radius = 0.02 } }""".replace("\n", "")
+    axes = "x = [-0.1, 0.1]\ny = [0.0]\nz = [1.0]\n"
+    head = f'schema = 1\nmap = "workspace"\nrobot = {robot}\n'
+    body = f'[limits]\ntension_max = 30.0\n[axes]\n{axes}[workspace]\nconditions = ["wrench-feasible"]\n'
+    paths = []
+    for name, words in (("any", 'without = "any-one"\n'), ("one", "without = [1]\n"), ("full", "")):
+        (tmp_path / f"{name}.toml").write_text(head + words + body)
+        code, _, err = cspr("run", tmp_path / f"{name}.toml", "-o", tmp_path / name)
+        assert code == 0, err
+        paths.append(tmp_path / name / f"{name}.h5")
+    with pytest.raises(ConfigError, match='without = "any-one": must be absent or list cables'):
+        cspr_jax.size(paths[0])
+    with pytest.raises(ConfigError, match=r"must have the winches of .*full"):
+        cspr_jax.size([paths[2], paths[1]])
+
+
 def test_poses_at_rest_are_held_by_the_worse_friction(tmp_path):
     robot = _file(tmp_path)
     axes = "x = [-0.2, 0.1, 5.0]\ny = [0.0, 0.1]\nz = [0.8, 1.2]\n"
@@ -187,6 +241,9 @@ def test_what_has_no_size_is_refused_in_one_line(tmp_path, checks):
         cspr_jax.size([checks[0], other])
     with pytest.raises(ConfigError, match="must be one plan or result"):
         cspr_jax.size([])
+    through = np.stack([0.0 * TIMES, 0.0 * TIMES, 0.5 - 0.4 * TIMES], axis=1)  # cables without a slope cannot hold it
+    with pytest.raises(ConfigError, match="must be another motion: torques are infinite"):
+        cspr_jax.size(cspr_jax.check(_file(tmp_path), TIMES, through, interpolation="quintic"))
     for arguments, words in (
         (["a.toml", "--factor", "0"], "--factor: 0: must be a number > 0"),
         (["a.toml", "-o", "picture"], "-o: picture: must end in"),
