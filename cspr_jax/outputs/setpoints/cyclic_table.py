@@ -19,7 +19,7 @@ def lines(points: SetPoints, rate: float, counts: np.ndarray | None) -> Iterator
     """Lines of the file, for encoders with some counts a turn of the motor."""
     if points.angle is None or points.speed is None or points.torque is None or counts is None:
         raise ConfigError("winch.encoder_counts", "missing: must be given for counts")
-    _check_end(points, rate)
+    _check_end(float(points.t[-1]), points.speed[-1], rate)
     per_radian = counts[None] / (2.0 * np.pi)
     integers = np.rint(np.hstack([points.angle * per_radian, points.speed * per_radian])).astype(np.int64)
     numbers = range(1, points.angle.shape[1] + 1)
@@ -29,10 +29,10 @@ def lines(points: SetPoints, rate: float, counts: np.ndarray | None) -> Iterator
         yield "\t".join([*map(str, counts_of_row), *map(repr, torque)])
 
 
-def _check_end(points: SetPoints, rate: float) -> None:
+def _check_end(time: float, speeds: np.ndarray, rate: float) -> None:
     # The last row may come after the end of a motion that rests there.
-    steps = float(points.t[-1]) * rate
+    steps = time * rate
     is_off_grid = abs(steps - round(steps)) > SAME_TICK
-    if is_off_grid and np.abs(points.speed[-1]).max() > STANDSTILL:  # type: ignore[index]
-        end = f"the motion ends moving at {float(points.t[-1]):.9g} s, between two cycles"
+    if is_off_grid and np.abs(speeds).max() > STANDSTILL:
+        end = f"the motion ends moving at {time:.9g} s, between two cycles"
         raise ConfigError("--rate", f"{rate:g} Hz: {end}: must be one of which its duration is a multiple")

@@ -50,10 +50,9 @@ def _joint_names(points: SetPoints) -> list[str]:
 
 
 def _points(points: SetPoints) -> Iterator[dict]:
-    if points.angle is None:
-        arrays = (points.length, points.rate, points.acceleration, -points.tension + 0.0)
-    else:
-        arrays = (points.angle, points.speed, points.motor_acceleration, points.torque)  # type: ignore[assignment]
+    of_motors = (points.angle, points.speed, points.motor_acceleration, points.torque)
+    of_cables = [points.length, points.rate, points.acceleration, -points.tension + 0.0]
+    arrays = [array for array in of_motors if array is not None] or of_cables
     stamps = np.rint(points.t * NANO).astype(np.int64)
     # Times must increase: the row just before the end may have its time in nanoseconds.
     is_later = np.append(np.diff(stamps) > 0, True)
