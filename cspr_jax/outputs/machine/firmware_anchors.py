@@ -30,7 +30,8 @@ from cspr_jax.robots.model.winch_numbers import WINCH_NUMBERS
 
 MM = 1000.0
 LETTERS = "ABCDIJLO"
-LARGEST_TEETH = 1000
+# Largest numbers of teeth on the motor and on the spool: products over the stages of a gear.
+MOTOR_TEETH, SPOOL_TEETH = 1000, 1_000_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,9 +179,10 @@ def _written(prefix: str, anchors: Anchors, lines: list[str], notes: Sequence[st
 
 def _teeth(ratio: float) -> tuple[int, int]:
     # Teeth of motor and spool whose ratio is that of the gear.
-    fraction = Fraction(ratio).limit_denominator(LARGEST_TEETH)
-    if abs(float(fraction) - ratio) > 1e-9 * ratio or fraction.numerator > 1_000_000:
-        raise ConfigError("winch.gear_ratio", f"{ratio:g}: must be a ratio of numbers of teeth, up to {LARGEST_TEETH}")
+    fraction = Fraction(ratio).limit_denominator(MOTOR_TEETH)
+    if abs(float(fraction) - ratio) > 1e-9 * ratio or fraction.numerator > SPOOL_TEETH:
+        allowed = f"a ratio of numbers of teeth, up to {SPOOL_TEETH} on the spool over {MOTOR_TEETH} on the motor"
+        raise ConfigError("winch.gear_ratio", f"{ratio:g}: must be {allowed}")
     return fraction.denominator, fraction.numerator
 
 
