@@ -157,11 +157,11 @@ class _Motions:
 
     def peaks(self) -> MotionDemands:
         samples = self.plan.demands.samples.tolist()
-        demands = motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
-        integrals = np.stack([demands.torque_rms, demands.energy, demands.regenerated_energy])
+        of_motors = motor_demands(self.robot, self.limits, self._motions, samples, self.plan.keys.tension_rule)
+        integrals = np.stack([of_motors.torque_rms, of_motors.energy, of_motors.regenerated_energy])
         if not np.isfinite(integrals).all():
             raise ConfigError(self.name, "must be another motion: torques are infinite, or jump too often for a mean")
-        return demands
+        return of_motors
 
     def curves(self) -> dict[str, np.ndarray]:
         speed, torque = winding_curves(self.robot, self.limits, self._motions, self.plan.keys.tension_rule)

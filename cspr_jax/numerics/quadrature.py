@@ -30,7 +30,7 @@ def integrals(
     """
     low, high = np.asarray(edges[:-1], float), np.asarray(edges[1:], float)
     full, estimates = float(edges[-1] - edges[0]), _estimates(function, low, high)
-    total, off, count = np.zeros(estimates.shape[1]), np.zeros(estimates.shape[1]), len(low)
+    total, residual, count = np.zeros(estimates.shape[1]), np.zeros(estimates.shape[1]), len(low)
     while len(low):
         middle = 0.5 * (low + high)
         halves = _estimates(function, np.concatenate([low, middle]), np.concatenate([middle, high]))
@@ -39,11 +39,11 @@ def integrals(
         scale = np.maximum(np.abs(total + better.sum(0)), floor)
         is_open = (errors > FRACTION * tolerance * scale).any(1) & (high - low > NARROWEST * full)
         is_open &= count < LARGEST_COUNT
-        total, off = total + better[~is_open].sum(0), off + errors[~is_open].sum(0)
+        total, residual = total + better[~is_open].sum(0), residual + errors[~is_open].sum(0)
         low, high, middle = low[is_open], high[is_open], middle[is_open]
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
         estimates = halves[np.tile(is_open, 2)]
-    return np.where(off > LOOSEST * np.maximum(np.abs(total), floor), np.nan, total)
+    return np.where(residual > LOOSEST * np.maximum(np.abs(total), floor), np.nan, total)
 
 
 def _estimates(function: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -62,10 +62,10 @@ class PlannedStop:
         """The stop in words."""
         if not self.is_found:
             return f"from t = {self.time:.4g} s: {NONE}"
-        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at {self.place}, {KINDS[self.kind]}"
+        return f"from t = {self.time:.4g} s: {self.duration:.4g} s, rest at {self.rest_position}, {KINDS[self.kind]}"
 
     @property
-    def place(self) -> str:
+    def rest_position(self) -> str:
         """The position at rest in words."""
         return f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(self.position, 9))})"
 
@@ -173,7 +173,7 @@ class StopsAlong:
             table.add_column(cell(head), justify="left" if head in ("rest at (m)", "kind") else "right")
         for stop in self.stops:
             numbers = (
-                [f"{stop.duration:.4g}", stop.place, f"{stop.margin:.3g}", KINDS[stop.kind]]
+                [f"{stop.duration:.4g}", stop.rest_position, f"{stop.margin:.3g}", KINDS[stop.kind]]
                 if stop.is_found
                 else ["", "", "", NONE]
             )
