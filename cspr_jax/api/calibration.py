@@ -226,15 +226,12 @@ def _of(
     source: Any,
     planned: NextPoses | None,
 ) -> Calibration:
-    rows = result.parameters.rows
-    is_shown = [i for i, row in enumerate(rows) if row.group != "tracker"]
-    units = np.array([row.sign * row.per_metre for row in rows])
     positions, quaternions = report.poses_in_file(result, *result.estimate.poses)
     return Calibration(
         robot=result.robot(nominal),
         offsets=np.asarray(result.estimate.setup.offsets),
-        names=tuple(rows[i].name for i in is_shown),
-        covariance=(result.covariance * units[:, None] * units)[np.ix_(is_shown, is_shown)],
+        names=tuple(row.name for row in result.parameters.rows if row.group != "tracker"),
+        covariance=result.reported_covariance(),
         noise=result.estimate.noise,
         positions=positions,
         quaternions=quaternions,

@@ -136,6 +136,8 @@ def forward(  # noqa: PLR0913
         angles: whether `lengths` are angles of the motors, rad, of a robot with winches.
         all_solutions: whether to look for all solutions. They are complete where `is_complete` says so; otherwise they
             are those found from many starts.
+        equilibrium: whether cables may be slack: the pose is then the stable one of least potential energy in which no
+            cable is longer than given; `weights` and `tolerance` must be absent.
         weights: (n_cables,) weights of the squared residuals of redundant cables; None: all equal.
         tolerance: largest residual of a solution, m; None: rounding (1e-9 of the robot's size), and of redundant
             cables any.
@@ -145,11 +147,14 @@ def forward(  # noqa: PLR0913
         poses, and residuals of the lengths.
 
     Raises:
-        InputError: shapes that do not fit, lengths that are not positive, angles of a robot without winches, or a start
-            outside the plane of a planar robot.
+        InputError: shapes that do not fit, `weights` or `tolerance` beside `equilibrium`, lengths that are not above 0,
+            angles of a robot without winches, or a start outside the plane of a planar robot.
     """
     if not isinstance(robot, PointMassRobot | PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
+    for name, value in (("weights", weights), ("tolerance", tolerance)):
+        if equilibrium and value is not None:
+            raise InputError(name, None, "must be absent beside equilibrium, which has none", problem="given")
     row = PATTERNS[robot.pattern]
     with double_precision():
         cable_lengths = checked_lengths(robot, lengths, is_angle=angles)

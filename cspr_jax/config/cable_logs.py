@@ -24,7 +24,7 @@ LARGEST_FILE = 1 << 28  # bytes
 LARGEST_ROWS = 2_000_000
 LARGEST_NUMBER = 1e12
 GAPS = ("", "nan", "na", "null", "none")
-_HEAD = re.compile(r"^([a-z]+)_?([1-9]\d{0,3})$|^(t|time)$")
+_HEAD = re.compile(r"^(length|angle|tension)_?([1-9]\d{0,3})$|^(t|time)$")
 _UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$")
 FORCES = {"N": 1.0, "kN": 1000.0, "mN": 0.001}
 UNITS = {"t": TIMES, "length": LENGTHS, "angle": ANGLES, "tension": FORCES}
@@ -97,8 +97,9 @@ def _columns(path: Path, line: int, heads: list[str]) -> tuple[dict[tuple[str, i
         with_unit = _UNIT.match(head)
         name, unit = (with_unit[1], with_unit[2]) if with_unit else (head, "")
         match = _HEAD.match(name.strip().lower())
-        if match is None or (kind := "t" if match[3] else match[1]) not in UNITS:
+        if match is None:
             continue
+        kind = "t" if match[3] else match[1]
         key = kind, 0 if match[3] else int(match[2])
         label = f"line {line}, column {k + 1}: {shown(head)}"
         if key in columns:

@@ -28,7 +28,6 @@ SCHEMA = 1
 MAX_PAIRS, MAX_MISTAKES = 5, 12
 # Digits behind the point of lengths in robot files, m.
 DIGITS = 12
-LIST_KEYS = {"base_points": "spools", "platform_points": "attachments"}
 
 
 def file_points(robot: AnyRobot) -> np.ndarray:
@@ -40,13 +39,13 @@ def file_points(robot: AnyRobot) -> np.ndarray:
 
 def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]]:
     """All parameters of the robot: nominal and calibrated values, standard deviations."""
-    deviations = np.sqrt(np.diagonal(result.covariance))
+    deviations, units = np.sqrt(np.diagonal(result.covariance)), result.parameters.units
     unseen = np.abs(result.estimate.measured.null_space).max(axis=0, initial=0.0) > 1e-5
     rows = []
     for i, row in enumerate(result.parameters.rows):
         if row.group == "tracker":
             continue
-        before, change = _nominal(result, nominal, row), float(result.estimate.total[i]) * row.sign * row.per_metre
+        before, change = _nominal(result, nominal, row), float(result.estimate.total[i] * units[i])
         fields: dict[str, Any] = {
             "name": row.name,
             "group": row.group,
@@ -131,9 +130,6 @@ def calibration_object(
 ) -> dict[str, Any]:
     """The object that `cspr calibrate --json` prints."""
     estimate, data = result.estimate, result.predictor.measurements
-    of_robot = [i for i, row in enumerate(result.parameters.rows) if row.group != "tracker"]
-    units = np.array([row.sign * row.per_metre for row in result.parameters.rows])
-    covariance = (result.covariance * units[:, None] * units)[np.ix_(of_robot, of_robot)]
     deviation, direction = result.weakest()
     parts = ("length", "position", "rotation")
     sigma = {part: getattr(data.deviations, part) * result.noise for part in parts}
@@ -149,7 +145,7 @@ def calibration_object(
         "sigma": sigma | {"given": data.deviations.are_given},
         "noise": estimate.noise,
         "parameters": parameter_rows(result, nominal),
-        "covariance": covariance.tolist(),
+        "covariance": result.reported_covariance().tolist(),
         "correlations": [{"first": first, "second": second, "value": value} for first, second, value in pairs],
         "not_identifiable": [direction.to_dict(result.parameters) for direction in result.directions],
         "weakest": {"standard_deviation": deviation, "text": direction},

@@ -144,11 +144,11 @@ def test_one_error_among_random_null_vectors():
     np.testing.assert_allclose(np.einsum("nij,njr->nir", matrices, null), 0.0, atol=1e-12)
     lengths = np.einsum("nji,nj->ni", matrices, rng.normal(size=(300, 6)))  # of displacements
     one = lengths + 0.01 * np.eye(9)[4]
-    found = disagreement.disagreement_of(matrices, one)
+    found = disagreement.disagreement_of(null, one)
     assert found.cable == 4 and np.isclose(found.errors[4], 0.01) and np.isclose(found.fractions[4], 1.0)
-    assert disagreement.disagreement_of(matrices, lengths + 0.01 * (np.eye(9)[4] - np.eye(9)[1])).cable is None
+    assert disagreement.disagreement_of(null, lengths + 0.01 * (np.eye(9)[4] - np.eye(9)[1])).cable is None
     longer = lengths + 0.02 * np.eye(9)[7] * ((np.arange(300) >= 100) & (np.arange(300) < 150))[:, None]
-    rows = disagreement.longer_rows(matrices, longer, 1e-3)
+    rows = disagreement.longer_rows(null, longer, 1e-3)
     # In some rows another cable would explain it about as well: these name none.
     assert rows[:, 7].sum() == rows.sum() > 15 and not rows[:100].any() and not rows[150:].any()
     inside = np.isin(np.arange(300), [*range(100, 120), *range(121, 150), 200])

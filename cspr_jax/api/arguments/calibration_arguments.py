@@ -11,7 +11,7 @@ import numpy as np
 from cspr_jax.api.arguments.check_keys import robot_table
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.measurements import MeasurementTable, read_distances, read_measurements
-from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.reading import checked, plain_values, read_toml
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.machine.calibration.measurements import NO_DISTANCES, USUAL, Deviations, Measurements, SpoolDistances
@@ -20,7 +20,7 @@ from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 
@@ -113,16 +113,17 @@ def target_of(robot: AnyRobot, point: str) -> Float[np.ndarray, "3"]:
     """Point that a tracker follows, from the mass centre or the joint; kernels' axes."""
     if not isinstance(robot, PlatformRobot) or robot.centre_of_mass is None:
         return np.zeros(3)
-    centre = np.asarray(robot.centre_of_mass)
     if PATTERNS[robot.pattern].is_jointed:
-        return centre if point == "mass-centre" else np.zeros(3)
+        if point == "mass-centre":
+            raise InputError("point", point, "origin for a robot on a joint: the tracker must see where the joint is")
+        return np.zeros(3)
+    centre = np.asarray(robot.centre_of_mass)
     return np.zeros(3) if point == "mass-centre" else -centre
 
 
 def limits_at_rest(robot: AnyRobot, limits: Any) -> Limits:
     """Limits of poses at rest, over those of the robot, in the kernels' axes."""
-    values = dict(limits) if isinstance(limits, Mapping) else vars(limits) if limits is not None else {}
-    values = {**values.pop("limits"), **values} if isinstance(values.get("limits"), dict) else values
+    values = _limit_values(limits, "limits") if isinstance(limits, Mapping) else vars(limits or NO_LIMITS)
     return limits_of(robot, values, vars(robot.limits), "limits.")
 
 
@@ -130,9 +131,14 @@ def limits_file(path: Path | None) -> dict[str, Any] | None:
     """Limits of a file with the keys of [limits] of a plan."""
     if path is None:
         return None
-    values = read_toml(path)
+    return _limit_values(read_toml(path), path)
+
+
+def _limit_values(given: Mapping[str, Any], source: object) -> dict[str, Any]:
+    # The keys of [limits] that are given, at the top or in a table of this name.
+    values = plain_values(given)
     values = {**values.pop("limits"), **values} if isinstance(values.get("limits"), dict) else values
-    return {name: value for name, value in dict(checked(LimitTable, values, path)).items() if value is not None}
+    return {name: value for name, value in dict(checked(LimitTable, values, source)).items() if value is not None}
 
 
 def robot_spec(file: RobotFile | None, robot: AnyRobot) -> dict[str, Any]:

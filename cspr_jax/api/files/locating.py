@@ -13,6 +13,9 @@ from cspr_jax.api.forward_kinematics import ForwardKinematics, forward
 from cspr_jax.api.robots import load_robot
 from cspr_jax.config.cable_logs import read_cable_log
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.machine.forward_kinematics.lengths import checked_lengths
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.plan_report import finite
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
@@ -29,7 +32,7 @@ class Located:
         answers: poses of the rows without gaps.
         rows: (n,) indices of these rows.
         times: (n,) s, or None.
-        is_placed: whether a start was given.
+        notes: lines for the user.
     """
 
     robot: Any
@@ -82,25 +85,21 @@ class Located:
     def to_dict(self) -> dict[str, Any]:
         """The poses as plain values, for JSON."""
         answers = self.answers
-
-        def plain(values: np.ndarray) -> Any:
-            return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()
-
         common: dict[str, Any] = {"schema": 1, "robot": self.robot.name, "z_axis": self.robot.z_axis}
-        common |= {"row": (self.rows + 1).tolist(), "t": None if self.times is None else plain(self.times)}
-        common |= {"position": plain(answers.positions), "found": answers.is_found.tolist()}
-        common |= {"quaternion": plain(answers.quaternions) if self._is_body else None}
-        common |= {"residual": plain(answers.residuals), "conditioning": plain(answers.conditioning)}
+        common |= {"row": (self.rows + 1).tolist(), "t": None if self.times is None else self.times.tolist()}
+        common |= {"position": answers.positions.tolist(), "found": answers.is_found.tolist()}
+        common |= {"quaternion": answers.quaternions.tolist() if self._is_body else None}
+        common |= {"residual": answers.residuals.tolist(), "conditioning": answers.conditioning.tolist()}
         common |= {"steps": answers.steps.tolist(), "count": answers.count.tolist(), "complete": answers.is_complete}
         if answers.slack is not None and answers.tensions is not None:
-            common |= {"slack": answers.slack.tolist(), "tension": plain(answers.tensions)}
+            common |= {"slack": answers.slack.tolist(), "tension": answers.tensions.tolist()}
         if answers.all_positions is not None and answers.all_quaternions is not None:
             pairs = zip(answers.all_positions, answers.all_quaternions, answers.count, strict=True)
             common["solutions"] = [
                 {"position": p[:n].tolist(), "quaternion": q[:n].tolist() if self._is_body else None}
                 for p, q, n in pairs
             ]
-        return common
+        return finite(common)
 
     def save(self, path: Path) -> None:
         """Write the poses as CSV: a header line and numbers, nothing else."""
@@ -155,9 +154,9 @@ def located(
         gaps = len(values) - len(rows)
         notes = (*log.notes, *([f"{gaps} rows with gaps are left out"] if gaps else []))
         times = None if log.times is None else log.times[rows]
-        values = values[rows]
+        values, lines = values[rows], log.lines[rows]
     else:
-        values = np.array([measured])
+        values, lines = np.array([measured]), None
     settings: dict[str, Any] = {}
     if start is not None:
         settings["start"] = start[:3]
@@ -165,7 +164,9 @@ def located(
             norm = np.linalg.norm(start[3:])
             settings["start_orientations"] = np.array(start[3:]) / (norm if abs(norm - 1.0) < 1e-3 else 1.0)
     try:
-        answers = forward(robot, values, angles=angles, all_solutions=all_solutions, equilibrium=slack, **settings)
+        with double_precision():
+            values = checked_lengths(robot, values, is_angle=angles, lines=lines)
+        answers = forward(robot, values, all_solutions=all_solutions, equilibrium=slack, **settings)
     except InputError as error:
         raise ConfigError(measured if isinstance(measured, Path) else reference, str(error)) from error
     return Located(robot, answers, rows, times, notes)

@@ -17,7 +17,13 @@ from cspr_jax.errors.arguments import Kind, Positive
 from cspr_jax.machine.forward_kinematics.lengths import lengths_of
 from cspr_jax.machine.forward_kinematics.solutions import Search
 from cspr_jax.machine.logs.delay import delay_of
-from cspr_jax.machine.logs.disagreement import disagreement_of, intervals, longer_rows
+from cspr_jax.machine.logs.disagreement import (
+    disagreement_of,
+    intervals,
+    longer_rows,
+    null_vectors,
+    robust_deviation,
+)
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.logs import log_report
@@ -130,13 +136,13 @@ def compare_log(
 
 
 def _lengths(read: CableLog, robot: Any, pairs: Any) -> np.ndarray:
-    # Lengths of the cables that the plan moves, with gaps; of pairs their mean.
+    # Lengths of the cables that the plan moves, with gaps; the cables of a pair, on one winch, count by their mean.
     values = np.asarray(read.angles if read.lengths is None else read.lengths)
+    if pairs is not None and values.shape[1] == 2 * robot.n_cables:
+        values = values[:, pairs.cables].mean(2)
     if read.lengths is None:
         is_given = np.isfinite(values)
         values = np.where(is_given, lengths_of(robot, np.where(is_given, values, 0.0), is_angle=True), np.nan)
-    if pairs is not None and values.shape[1] == 2 * robot.n_cables:
-        values = values[:, pairs.cables].mean(2)
     if values.shape[1] != robot.n_cables:
         raise InputError("columns", values.shape[1], f"{robot.n_cables}, one a cable")
     return values
@@ -160,9 +166,11 @@ def _compared(
     rows = np.flatnonzero(np.isfinite(lengths).all(1) & (lengths > 0.0).all(1))
     if not len(rows):
         raise ConfigError(path, "every row has gaps: must have a row with numbers for all cables")
-    delay = delay_of(times, lengths, curves.lengths, curves.rates, min(max_delay, curves.duration))
+    largest = min(max_delay, curves.duration)
+    delay = delay_of(times, lengths, curves.lengths, curves.rates, largest)
     if delay.is_at_edge:
-        warnings.append(f"the delay is at the end of what was looked for, {max_delay:g} s: --max-delay looks farther")
+        farther = ": --max-delay looks farther" if max_delay < curves.duration else ", the plan's duration"
+        warnings.append(f"the delay is at the end of what was looked for, {largest:g} s{farther}")
     shift = 0.0 if np.isnan(delay.value) else delay.value
     robot = centred(planned.problem.robot)[0]
     search = Search(robot, np.ones(robot.n_cables), None, np.zeros(3))
@@ -210,16 +218,16 @@ def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, 
     matrices = in_batches(lambda x: geometry.wrench_matrices(robot, *x), cases, batch_size=BATCH)
     matrices = matrices / np.where(geometry.scales(robot), search.radius, 1.0)[:, None]
     measured = -poses.residuals[picked, 0]
-    disagreement = disagreement_of(matrices, measured)
+    null = null_vectors(matrices)
+    disagreement = disagreement_of(null, measured)
     if robot.n_cables < robot.dof + 2:
         return disagreement, None
     constant = np.zeros(robot.n_cables)
     if disagreement.cable is not None:
         constant[disagreement.cable] = disagreement.errors[disagreement.cable]
     rest = measured - constant
-    spread = 1.4826 * float(np.median(np.abs(measured)))
-    threshold = DEVIATIONS * spread + SMALLEST * search.size
-    return disagreement, longer_rows(matrices, rest, threshold)
+    threshold = DEVIATIONS * robust_deviation(null, rest) + SMALLEST * search.size
+    return disagreement, longer_rows(null, rest, threshold)
 
 
 def _slack(

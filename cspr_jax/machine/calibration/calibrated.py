@@ -65,8 +65,16 @@ class Calibrated:
 
     @property
     def covariance(self) -> Float[np.ndarray, "p p"]:
-        """Covariance of the parameters, without what cannot be seen, m^2."""
-        return self.estimate.reduced.covariance * self.noise**2
+        """Covariance of the parameters as near the nominal robot as what cannot be seen allows, m^2."""
+        return self.estimate.gauged(self.estimate.reduced.covariance, self.parameters.is_of_machine) * self.noise**2
+
+    def reported_covariance(self) -> Float[np.ndarray, "r r"]:
+        """Covariance of the robot's numbers, without the tracker's axes, in the units and axes of the file."""
+        units, shown = (
+            self.parameters.units,
+            [i for i, row in enumerate(self.parameters.rows) if row.group != "tracker"],
+        )
+        return (self.covariance * units[:, None] * units)[np.ix_(shown, shown)]
 
     @property
     def degrees(self) -> float:
@@ -105,8 +113,8 @@ class Calibrated:
         if not problem.is_seen.any():
             return np.inf, ""
         last = int(np.flatnonzero(problem.is_seen)[-1])
-        reported = problem.vectors[last] * np.array([row.sign * row.per_metre for row in self.parameters.rows])
-        return self.noise / float(problem.values[last]), terms(self.parameters, reported)
+        words = terms(self.parameters, problem.vectors[last] * self.parameters.units)
+        return self.noise / float(problem.values[last]), words
 
     def robot(self, nominal: AnyRobot) -> AnyRobot:
         """The calibrated robot in the axes of the file, where `nominal` is."""
@@ -134,8 +142,8 @@ class Calibrated:
         measured = self.estimate.poses.positions
         robot = dataclasses.replace(self.estimate.setup.robot, limits=limits)
         choice = candidates(robot, limits, self.fixed, measured, CANDIDATES)
-        is_measured = np.asarray(self.estimate.is_used.any(axis=0))
-        return next_poses(self.predictor, self.estimate, choice, count, is_measured)
+        counts = self.estimate.is_used.sum(axis=0)
+        return next_poses(self.predictor, self.estimate, choice, count, counts > 0.5 * counts.max())
 
 
 def calibrated(

@@ -79,7 +79,7 @@ def unseen_directions(
 
 def _in_file(parameters: Parameters, vector: np.ndarray) -> np.ndarray:
     # A direction in the units and axes of reports, its largest entry 1.
-    reported = vector * np.array([row.sign * row.per_metre for row in parameters.rows])
+    reported = vector * parameters.units
     return reported / reported[np.abs(reported).argmax()]
 
 

@@ -15,6 +15,8 @@ from cspr_jax.numerics.shapes import Bool, Float
 # Singular values up to this fraction of the largest one are those of directions that cannot be seen. Rounding leaves
 # some 1e-14; a direction at the bound would be known ten million times worse than the best one.
 RANK = 1e-7
+# Directions that cannot be seen of which less than this part moves the machine move the tracker alone.
+TRACKER_ALONE = 1e-6
 
 
 class Reduced(NamedTuple):
@@ -58,6 +60,19 @@ class Reduced(NamedTuple):
         """Information about the parameters, 1/m^2."""
         spread = self.vectors * self.values[:, None]
         return spread.T @ spread
+
+
+def toward_nominal(
+    null_space: Float[np.ndarray, "q p"], is_of_machine: Bool[np.ndarray, "p"]
+) -> Float[np.ndarray, "p p"]:
+    """Map from a change of the parameters to the step along the null space that makes the machine's part least.
+
+    With its sum with the identity as P, P C P^T is the covariance of parameters after this step, for any covariance C.
+    """
+    weights = is_of_machine.astype(float)
+    outer, parts, inner = np.linalg.svd(null_space.T * weights[:, None], full_matrices=False)
+    moves = parts > TRACKER_ALONE
+    return -null_space.T @ (inner[moves].T / parts[moves]) @ (outer.T[moves] * weights)
 
 
 def reduced(
@@ -109,14 +124,6 @@ def redundancies(problem: Reduced) -> Float[np.ndarray, "k m"]:
     spread = problem.vectors[problem.is_seen] / problem.values[problem.is_seen, None]
     lost = free @ (problem.rows @ spread.T)
     return np.sum(free**2, axis=2) - np.sum(lost**2, axis=2)
-
-
-def pose_covariances(problem: Reduced) -> Float[np.ndarray, "k d d"]:
-    """Covariances of the poses' coordinates for whitened residuals of variance 1, m^2."""
-    dof = problem.inverse.shape[1]
-    spread = problem.vectors[problem.is_seen] / problem.values[problem.is_seen, None]
-    along = problem.inverse @ (problem.rows[:, :dof] @ spread.T)
-    return problem.inverse @ np.swapaxes(problem.inverse, 1, 2) + along @ np.swapaxes(along, 1, 2)
 
 
 def degrees_of_freedom(problem: Reduced, is_used: Bool[np.ndarray, "k m"], extra: int) -> int:

@@ -21,6 +21,7 @@ from cspr_jax.machine.calibration.elimination import (
     reduced,
     redundancies,
     step_of,
+    toward_nominal,
 )
 from cspr_jax.machine.calibration.predictions import Linearised, Predictor
 from cspr_jax.machine.calibration.setups import EffectorPoses, Setup
@@ -29,7 +30,6 @@ from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.model.point_mass import spool_radius
 
 Loss = Literal["squares", "huber", "cauchy"]
-LOSSES = ("squares", "huber", "cauchy")
 # Widths of the losses in standard deviations: 95 % of the precision of least squares where errors are normal.
 WIDTHS = {"huber": 1.345, "cauchy": 2.385}
 # Standard deviations beyond which a measurement is a mistake: of ten thousand good ones, none in 170 cases of 171.
@@ -52,8 +52,6 @@ FEWEST = 10
 SETTLED = 1e-3
 # Residuals below this fraction of the robot's size may be rounding, where no standard deviation is given.
 RESOLUTION = 1e-10
-# Singular values below this fraction are zero: directions that move the tracker alone.
-SMALLEST_RATIO = 1e-9
 # Median of the magnitudes of normal errors, over their standard deviation.
 MEDIAN = float(ndtri(0.75))
 
@@ -94,6 +92,13 @@ class Estimate:
     cost: float
     is_converged: bool
 
+    def gauged(
+        self, covariance: Float[np.ndarray, "p p"], is_of_machine: Bool[np.ndarray, "p"]
+    ) -> Float[np.ndarray, "p p"]:
+        """A covariance of what can be seen, as that of the estimate, which stays near the nominal robot."""
+        nearest = np.eye(len(covariance)) + toward_nominal(self.reduced.null_space, is_of_machine)
+        return nearest @ covariance @ nearest.T
+
 
 @dataclasses.dataclass
 class _Iterate:
@@ -123,10 +128,11 @@ class Adjustment:
         return _Iterate(setup, poses, total, self.predictor(setup, poses), extra)
 
     def _prior(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # The nominal numbers count as measurements with their known deviations.
-        deviation, is_of_machine = self.predictor.measurements.prior, self.parameters.is_of_machine
-        is_known = is_of_machine & np.isfinite(deviation)
-        return np.eye(len(total))[is_known] / deviation, total[is_known] / deviation
+        # The nominal numbers count as measurements with their known deviation, which is that of the numbers themselves.
+        prior = self.predictor.measurements.prior
+        weights = np.abs(self.parameters.units) / prior
+        is_known = self.parameters.is_of_machine & np.isfinite(prior)
+        return np.diag(weights)[is_known], (total * weights)[is_known]
 
     def _distances(self, setup: Setup) -> tuple[np.ndarray, np.ndarray]:
         # Residuals of distances between spools, whitened, and their derivatives.
@@ -160,7 +166,8 @@ class Adjustment:
         for _ in range(iterations):
             problem = self.reduced(weights, damping)
             step = step_of(problem, damping)
-            step = step + self._toward_nominal(problem, step)
+            # Along what cannot be seen, as close to the nominal robot as possible.
+            step = step + toward_nominal(problem.null_space, self.parameters.is_of_machine) @ (self.best.total + step)
             moves = pose_steps(problem, step)
             trial = self._at(
                 self.parameters.moved(self.best.setup, step),
@@ -182,15 +189,6 @@ class Adjustment:
                     return False
         return False
 
-    def _toward_nominal(self, problem: Reduced, step: np.ndarray) -> np.ndarray:
-        # Along what cannot be seen, as close to the nominal robot as possible.
-        null_space = problem.null_space
-        if not len(null_space):
-            return np.zeros_like(step)
-        weights = self.parameters.is_of_machine.astype(float)
-        total = (self.best.total + step) * weights
-        return -null_space.T @ np.linalg.lstsq(null_space.T * weights[:, None], total, rcond=SMALLEST_RATIO)[0]
-
     def standardised(self, weights: Float[np.ndarray, "k m"]) -> tuple[np.ndarray, np.ndarray, float]:
         """Residuals over their standard deviations, redundancies, and the noise that their median says."""
         problem = self.reduced(weights)
@@ -208,7 +206,7 @@ class Adjustment:
     def can_find_mistakes(self) -> bool:
         """Tell whether there are enough measurements to find mistakes among them."""
         used = self.predictor.is_used
-        return degrees_of_freedom(self.reduced(used.astype(float)), used, 0) >= FEWEST
+        return degrees_of_freedom(self.reduced(used.astype(float)), used, len(self.best.extra[1])) >= FEWEST
 
     def scale(self, noise: float) -> float:
         """Standard deviation of the whitened residuals, from their median if none was given."""
@@ -232,11 +230,11 @@ def estimated(adjustment: Adjustment, loss: Loss) -> Estimate:
     is_converged = adjustment.solve(used.astype(float))
     if loss != "squares" and adjustment.can_find_mistakes():
         mistaken = adjustment.mistakes(_reweighted(adjustment, loss), mistaken)
-        for turn in range(ROUNDS):
+        for iteration in range(ROUNDS):
             is_converged = adjustment.solve((used & ~mistaken).astype(float))
             update = adjustment.mistakes((used & ~mistaken).astype(float), mistaken)
-            update = update if turn < ROUNDS // 2 else update | mistaken
-            if (update == mistaken).all() or turn == ROUNDS - 1:
+            update = update if iteration < ROUNDS // 2 else update | mistaken
+            if (update == mistaken).all() or iteration == ROUNDS - 1:
                 break
             mistaken = update
     return _answer(adjustment, mistaken, is_converged)

@@ -112,7 +112,8 @@ def next_poses(
         chosen.append(int(gains.argmax()))
         information = information + rows[chosen[-1]].T @ rows[chosen[-1]]
     added = np.sum([rows[i].T @ rows[i] for i in chosen], axis=0) + estimate.reduced.information
-    return NextPoses(EffectorPoses(*(x[chosen] for x in choice)), readings[chosen], _covariance(estimate, added))
+    covariance = estimate.gauged(_covariance(estimate, added), predictor.parameters.is_of_machine)
+    return NextPoses(EffectorPoses(*(x[chosen] for x in choice)), readings[chosen], covariance)
 
 
 def _covariance(estimate: Estimate, information: np.ndarray) -> np.ndarray:

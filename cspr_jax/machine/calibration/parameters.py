@@ -79,6 +79,11 @@ class Parameters:
         return len(self.rows)
 
     @property
+    def units(self) -> Float[np.ndarray, "p"]:
+        """Changes of reported numbers, in the axes of the file, over the parameters."""
+        return np.array([row.sign * row.per_metre for row in self.rows])
+
+    @property
     def is_of_machine(self) -> np.ndarray:
         """Tell which parameters belong to the robot, (p,)."""
         return np.array([row.group not in ("tracker", "target") for row in self.rows])
@@ -126,6 +131,13 @@ def checked_groups(robot: AnyRobot, free: Sequence[str], *, are_angles: bool, ha
         "drums": "" if are_angles else "absent where lengths are measured: drums need angles of motors",
         "pulleys": "" if robot.pulleys is not None else "absent: the robot has no pulleys",
     }
+    row = PATTERNS[robot.pattern]
+    if row.is_jointed or row.dof == 1:
+        # Such positions lie in one point or on one line, and say where the joint or the guide is.
+        reasons["tracker"] = (
+            f"absent for a robot on a {'joint' if row.is_jointed else 'guide'}: positions say where it is"
+        )
+        reasons["target"] = reasons.get("target") or reasons["tracker"]
     for name in ("tracker", "target"):
         reasons[name] = reasons.get(name) or ("" if has_positions else "absent where no positions are measured")
     for name in free:
@@ -190,9 +202,8 @@ def _of_point(robot: AnyRobot, group: str, i: int, signs: np.ndarray) -> list[tu
 
 def _of_tracker(robot: AnyRobot, group: str, signs: np.ndarray, length: float) -> list:
     row, parts = PATTERNS[robot.pattern], []
-    is_guided = robot.pattern == "1T"
-    axes: Sequence[int] = (2,) if is_guided else (0, 2) if row.is_planar else (0, 1, 2)
-    turns: Sequence[int] = () if is_guided else (1,) if row.is_planar else (0, 1, 2)
+    axes: Sequence[int] = (0, 2) if row.is_planar else (0, 1, 2)
+    turns: Sequence[int] = (1,) if row.is_planar else (0, 1, 2)
     if group == "target":
         parts = [(Parameter(group, None, "xyz"[k], float(signs[k])), TARGET.start + k, 1.0) for k in axes]
     else:

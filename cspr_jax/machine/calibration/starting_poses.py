@@ -73,21 +73,21 @@ def starting_poses(
         errors = improve(EffectorPoses(positions, quaternions))
         if (errors <= CLOSE * radius).all():
             break
-    for turn in range(NEIGHBOURS):
+    for iteration in range(NEIGHBOURS):
         typical = np.quantile(errors[np.isfinite(errors)], 0.25) if np.isfinite(errors).any() else 0.0
         is_wrong = ~(errors <= WRONG * typical + RESOLUTION * radius)
         if not is_wrong.any() or is_wrong.all():
             break
-        errors = improve(_neighbours(best, np.nan_to_num(data.readings * setup.per_reading), is_wrong, turn))
+        errors = improve(_neighbours(best, np.nan_to_num(data.readings * setup.per_reading), is_wrong, iteration))
     return best
 
 
-def _neighbours(poses: EffectorPoses, readings: np.ndarray, is_wrong: np.ndarray, turn: int) -> EffectorPoses:
-    # In place of wrong poses, right ones whose readings are near.
+def _neighbours(poses: EffectorPoses, readings: np.ndarray, is_wrong: np.ndarray, rank: int) -> EffectorPoses:
+    # In place of wrong poses, right ones whose readings are near: the nearest, or the one of that rank.
     right = np.flatnonzero(~is_wrong)
     distances = np.linalg.norm(readings[is_wrong][:, None] - readings[right], axis=2)
     chosen = np.arange(len(readings))
-    chosen[is_wrong] = right[np.argsort(distances, axis=1)[:, min(turn, len(right) - 1)]]
+    chosen[is_wrong] = right[np.argsort(distances, axis=1)[:, min(rank, len(right) - 1)]]
     return EffectorPoses(*(part[chosen] for part in poses))
 
 
@@ -128,14 +128,12 @@ def _nearest(
 def aligned_tracker(setup: Setup, poses: EffectorPoses, positions: Float[np.ndarray, "k 3"]) -> Setup:
     """A setup whose tracker sees poses at measured positions, as nearly as a rotation allows."""
     row = PATTERNS[setup.robot.pattern]
-    seen = np.isfinite(positions[:, list(row.forces or range(3))]).all(1)
+    seen = np.isfinite(positions[:, list(row.forces)]).all(1)
     if np.count_nonzero(seen) < 3:
         error = f"{np.count_nonzero(seen)} poses with positions"
         raise InputError("tracker", None, "must be three or more, to find the axes of a tracker", problem=error)
     turns = Rotation.from_quat(poses.quaternions[seen], scalar_first=True)
     inner, outer = poses.positions[seen] + turns.apply(setup.target), np.nan_to_num(positions[seen])
-    if row.dof == 1:
-        return setup._replace(shift=(outer - inner).mean(0) * [0.0, 0.0, 1.0])
     centre, outer_centre = inner.mean(0), outer.mean(0)
     spreads = np.linalg.svd(outer - outer_centre, compute_uv=False)
     if not spreads[1] > ON_LINE * spreads[0]:

@@ -28,11 +28,14 @@ def lengths_of(robot: Any, source: ArrayLike, *, is_angle: bool) -> Float[np.nda
     return values
 
 
-def checked_lengths(robot: Any, source: ArrayLike, *, is_angle: bool) -> Float[np.ndarray, "n n_cables"]:
-    """Lengths of cables, m, that are above 0."""
+def checked_lengths(
+    robot: Any, source: ArrayLike, *, is_angle: bool, lines: np.ndarray | None = None
+) -> Float[np.ndarray, "n n_cables"]:
+    """Lengths of cables, m, that are above 0; of a file, errors name one of its lines."""
     values, name = lengths_of(robot, source, is_angle=is_angle), "angles" if is_angle else "lengths"
     bad = np.flatnonzero(~((values > 0.0) & (values <= LARGEST_LENGTH)).all(1))
     if len(bad):
         allowed = "lengths > 0, at most 1e6 m" if not is_angle else "angles that give lengths > 0, at most 1e6 m"
-        raise InputError(f"{name}[{bad[0]}]", values[bad[0]].tolist(), allowed)
+        key = f"{name}[{bad[0]}]" if lines is None else f"line {lines[bad[0]]}: {name}"
+        raise InputError(key, np.atleast_2d(np.asarray(source, float))[bad[0]].tolist(), allowed)
     return values

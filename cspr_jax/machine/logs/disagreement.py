@@ -43,9 +43,8 @@ def null_vectors(matrices: Float[np.ndarray, "n dof m"]) -> Float[np.ndarray, "n
     return np.linalg.svd(matrices)[2][:, dof:].transpose(0, 2, 1)
 
 
-def disagreement_of(matrices: Float[np.ndarray, "n dof m"], measured: Float[np.ndarray, "n m"]) -> Disagreement:
-    """Disagreement of cables, from wrench matrices and measured minus fitted lengths."""
-    null = null_vectors(matrices)
+def disagreement_of(null: Float[np.ndarray, "n m r"], measured: Float[np.ndarray, "n m"]) -> Disagreement:
+    """Disagreement of cables, from null vectors and measured minus fitted lengths."""
     parts = np.einsum("nmr,nm->nr", null, measured)
     along = np.einsum("nmr,nr->m", null, parts)
     squares, total = (null**2).sum((0, 2)), float((parts**2).sum())
@@ -58,11 +57,13 @@ def disagreement_of(matrices: Float[np.ndarray, "n dof m"], measured: Float[np.n
     return Disagreement(errors, fractions, int(order[0]) if is_clear and total > 0.0 else None, spread)
 
 
-def longer_rows(
-    matrices: Float[np.ndarray, "n dof m"], measured: Float[np.ndarray, "n m"], threshold: float
-) -> np.ndarray:
+def robust_deviation(null: Float[np.ndarray, "n m r"], measured: Float[np.ndarray, "n m"]) -> float:
+    """Standard deviation of lengths, m, from the median of what no pose explains, for errors that are independent."""
+    return 1.4826 * float(np.median(np.abs(np.einsum("nmr,nm->nr", null, measured))))
+
+
+def longer_rows(null: Float[np.ndarray, "n m r"], measured: Float[np.ndarray, "n m"], threshold: float) -> np.ndarray:
     """Rows and cables (n, m) where one cable alone is longer than the pose of the others; needs two spare cables."""
-    null = null_vectors(matrices)
     parts = np.einsum("nmr,nm->nr", null, measured)
     along, squares = np.einsum("nmr,nr->nm", null, parts), (null**2).sum(2)
     errors = along / np.where(squares > 0.0, squares, 1.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from cspr_jax.machine.logs.delay import Delay
 from cspr_jax.machine.logs.disagreement import CLEARLY, EXPLAINS, Disagreement
+from cspr_jax.outputs.plan_report import finite
 
 MOST_INTERVALS = 5
 OFF_PLAN = 3.0  # times the mean difference of the next cable from which on one stands out
@@ -72,56 +73,54 @@ class ComparedLog:
 def log_object(log: ComparedLog) -> dict[str, Any]:
     """The comparison as an object for JSON."""
     delay = log.delay
-    return {
+    fields = {
         "schema": 1,
         "robot": log.robot,
         "family": log.family,
         "rows": len(log.times),
         "rows_with_gaps": len(log.times) - len(log.rows),
         "rows_without_pose": int((~log.is_found).sum()),
-        "delay": _plain(delay.value),
-        "delay_deviation": _plain(delay.deviation),
-        "delay_rival": _plain(delay.rival),
+        "delay": delay.value,
+        "delay_deviation": delay.deviation,
+        "delay_rival": delay.rival,
         "position_error_before": _peak(log, log.position_errors_before),
         "position_error": _peak(log, log.position_errors),
         "angle_error": None if log.angle_errors is None else _peak(log, log.angle_errors),
         "disagreeing_cable": disagreeing_cable(log),
         "disagreement": disagreement_words(log),
-        "unexplained": None if log.disagreement is None else _plain(log.disagreement.spread),
+        "unexplained": None if log.disagreement is None else log.disagreement.spread,
         "cables": [_cable(log, k) for k in range(log.length_errors.shape[1])],
         "tolerance": log.tolerance,
         "within_tolerance": log.within_tolerance,
         "warnings": list(log.warnings),
     }
+    return finite(fields)
 
 
-def _plain(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _peak(log: ComparedLog, errors: np.ndarray) -> dict[str, float | None]:
+def _peak(log: ComparedLog, errors: np.ndarray) -> dict[str, float]:
+    if not np.isfinite(errors).any():
+        return dict.fromkeys(("rms", "largest", "t"), math.nan)
     k = int(np.nanargmax(errors))
     rms = float(np.sqrt(np.mean(errors**2)))
-    return {"rms": _plain(rms), "largest": _plain(errors[k]), "t": _plain(log.times[log.rows[k]])}
+    return {"rms": rms, "largest": float(errors[k]), "t": float(log.times[log.rows[k]])}
 
 
 def _cable(log: ComparedLog, k: int) -> dict[str, Any]:
-    errors, head = log.length_errors[:, k], {"cable": k}
-    if not np.isfinite(errors).any():
-        return {**head, "offset": None, "rms": None, "largest": None, "t": None, "slack": [], "lengthened": []}
+    # A row without gaps gives each cable a number.
+    errors, disagreement = log.length_errors[:, k], log.disagreement
     worst = int(np.nanargmax(np.abs(errors)))
-    disagreement = None if log.disagreement is None else log.disagreement
     row = {
-        "offset": _plain(log.delay.offsets[k]),
-        "rms": _plain(float(np.sqrt(np.nanmean(errors**2)))),
-        "largest": _plain(errors[worst]),
-        "t": _plain(log.times[worst]),
-        "constant_error": None if disagreement is None else _plain(disagreement.errors[k]),
-        "explains": None if disagreement is None else _plain(disagreement.fractions[k]),
+        "cable": k,
+        "offset": float(log.delay.offsets[k]),
+        "rms": float(np.sqrt(np.nanmean(errors**2))),
+        "largest": float(errors[worst]),
+        "t": float(log.times[worst]),
+        "constant_error": None if disagreement is None else float(disagreement.errors[k]),
+        "explains": None if disagreement is None else float(disagreement.fractions[k]),
         "slack": None if log.slack is None else [list(pair) for pair in log.slack[k]],
         "lengthened": [list(pair) for pair in log.lengthened[k]],
     }
-    return head | row | _tension(log, k)
+    return row | _tension(log, k)
 
 
 def _tension(log: ComparedLog, k: int) -> dict[str, Any]:
@@ -130,7 +129,7 @@ def _tension(log: ComparedLog, k: int) -> dict[str, Any]:
         return {"tension_shortfall": None, "tension_shortfall_t": None}
     short = log.planned_tensions[:, k] - log.tensions[:, k]
     worst = int(np.nanargmax(short))
-    return {"tension_shortfall": _plain(short[worst]), "tension_shortfall_t": _plain(log.times[worst])}
+    return {"tension_shortfall": float(short[worst]), "tension_shortfall_t": float(log.times[worst])}
 
 
 def disagreeing_cable(log: ComparedLog) -> int | None:
@@ -152,7 +151,7 @@ def _off_plan(log: ComparedLog) -> int | None:
     # The cable whose mean difference from the plan is several times that of any other.
     sizes = np.nan_to_num(np.abs(log.delay.offsets))
     order = np.argsort(-sizes)
-    return int(order[0]) if sizes[order[0]] > OFF_PLAN * sizes[order[1]] else None
+    return int(order[0]) if len(order) > 1 and sizes[order[0]] > OFF_PLAN * sizes[order[1]] else None
 
 
 def disagreement_words(log: ComparedLog) -> str:
@@ -188,9 +187,8 @@ def log_lines(log: ComparedLog) -> list[str]:
     lines.append(f"position error: {_peak_words(before)} before the delay is taken out, {_peak_words(after)} after")
     if log.angle_errors is not None:
         degrees = _peak(log, np.degrees(log.angle_errors))
-        lines.append(
-            f"angle error: {degrees['rms']:.4g}° rms, largest {degrees['largest']:.4g}° at {degrees['t']:.4g} s"
-        )
+        rms, largest, at = (_number(degrees[name]) for name in ("rms", "largest", "t"))
+        lines.append(f"angle error: {rms}° rms, largest {largest}° at {at} s")
     missed = int((~log.is_found).sum())
     lines += [f"{missed} rows have lengths that no pose has"] if missed else []
     lines += [disagreement_words(log), *_slack_lines(log)]
@@ -209,8 +207,8 @@ def _delay_words(delay: Delay) -> str:
     return words + rival
 
 
-def _peak_words(peak: dict[str, float | None]) -> str:
-    return f"{_mm(peak['rms'])} mm rms, largest {_mm(peak['largest'])} mm at {peak['t']:.4g} s"
+def _peak_words(peak: dict[str, float]) -> str:
+    return f"{_mm(peak['rms'])} mm rms, largest {_mm(peak['largest'])} mm at {_number(peak['t'])} s"
 
 
 def _slack_lines(log: ComparedLog) -> list[str]:
@@ -224,8 +222,12 @@ def _slack_lines(log: ComparedLog) -> list[str]:
     return lines
 
 
+def _number(value: float | None, form: str = ".4g") -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{value:{form}}"
+
+
 def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{1000.0 * value:.4g}"
+    return _number(None if value is None else 1000.0 * value)
 
 
 def log_table(log: ComparedLog) -> Any:
@@ -241,11 +243,10 @@ def log_table(log: ComparedLog) -> Any:
     for k in range(log.length_errors.shape[1]):
         row = _cable(log, k)
         cells = [str(k + 1), *(_mm(row[name]) for name in ("offset", "rms", "largest"))]
-        cells.append("-" if row["t"] is None else f"{row['t']:.4f}")
+        cells.append(_number(row["t"], ".4f"))
         if log.disagreement is not None:
-            cells += [f"{log.disagreement.fractions[k]:.0%}", _mm(row["constant_error"])]
+            cells += [_number(row["explains"], ".0%"), _mm(row["constant_error"])]
         if log.tensions is not None:
-            short = row["tension_shortfall"]
-            cells.append("-" if short is None else f"{short:.4g}")
+            cells.append(_number(row["tension_shortfall"]))
         table.add_row(*cells)
     return table
