@@ -211,17 +211,20 @@ def _starts(
     check_in_plane("start", points, is_planar=row.is_planar)
     is_placed = row.is_jointed or row.dof == 1
     if len(points) != 1 and (is_placed or len(points) != count):
-        raise InputError("start", f"shape {np.shape(start)}", "(3,)" if is_placed else f"(3,) or ({count}, 3)")
+        allowed = "must be (3,)" if is_placed else f"must be (3,) or ({count}, 3)"
+        raise InputError("start", None, allowed, problem=f"an array of shape {np.shape(start)}")
     turns = np.array([IDENTITY])
     if orientations is not None:
         if not row.is_body:
             raise InputError("start_orientations", None, "must be None", problem="a point mass has none")
         values = np.atleast_2d(np.asarray(orientations, float))
         if len(values) not in (1, count):
-            raise InputError("start_orientations", f"shape {np.shape(orientations)}", f"(4,) or ({count}, 4)")
+            error = f"an array of shape {np.shape(orientations)}"
+            raise InputError("start_orientations", None, f"must be (4,) or ({count}, 4)", problem=error)
         turns = np.asarray(frame.rotated_quaternions(quaternions("start_orientations", values, len(values))))
         if row.is_planar and turns[:, [1, 3]].any():
-            raise InputError("start_orientations", "not about y", "turns about y: those of a planar robot")
+            error = "rotations not about y"
+            raise InputError("start_orientations", None, "must be about y, those of a planar robot", problem=error)
     inner = np.broadcast_to(np.asarray(frame.inward(points)), (count, 3)).copy()
     rotations = np.broadcast_to(turns, (count, 4)).copy()
     return (mass_centres(robot, inner, rotations) if point == "origin" else inner), rotations

@@ -9,6 +9,7 @@ from oracles import pulleys as pulley_oracle
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, f
 from support import cable_robots
+from support.calibration_cases import body_case, built, quaternions_of
 from support.prism import PRISM, prism, prism_case, prism_positions
 
 import cspr_jax
@@ -143,38 +144,6 @@ def test_the_uncertainty_holds_all_spools(trials):
         result = cspr_jax.calibrate(prism(), readings, seen)
         inside += np.linalg.norm(result.robot.base_points - spools, axis=1).max() <= result.spool_positions
     assert inside >= 0.95 * trials - 3.0 * np.sqrt(0.05 * 0.95 * trials)
-
-
-def body_case(seed, count, noise, *, n=8, pattern="3R3T", error=2e-3):
-    """A random robot, one off by errors, poses, and readings of the latter."""
-    rng = np.random.default_rng(seed)
-    robot = cable_robots.any_robot(rng, pattern, n)
-    poses = [robot.pose(rng) for _ in range(count)]
-    positions, rotations = np.array([pose[0] for pose in poses]), np.array([pose[1] for pose in poses])
-    free = {"1T": [2], "2T": [0, 2], "1R2T": [0, 2]}.get(pattern, [0, 1, 2])
-    spools, points = robot.base.copy(), robot.platform.copy()
-    spools[:, free] += error * rng.normal(size=(n, len(free)))
-    if pattern == "2R3T":
-        line = points[np.abs(points).max(1).argmax()]
-        points = points + error * rng.normal(size=(n, 1)) * line / np.linalg.norm(line)
-    elif pattern not in cable_robots.POINT_MASSES:
-        points[:, free] += error * rng.normal(size=(n, len(free)))
-    offsets = error * rng.normal(size=n)
-    readings = oracle.lengths(spools, points, positions, rotations) - offsets
-    return robot, spools, points, offsets, positions, rotations, readings + noise * rng.normal(size=readings.shape)
-
-
-def built(robot, **changes):
-    """The package's robot."""
-    if robot.pattern in cable_robots.POINT_MASSES:
-        return cspr_jax.point_mass(robot.base, mass=robot.mass, pattern=robot.pattern, z_axis="up", **changes)
-    inertia = robot.mass * np.diag([0.1, 0.12, 0.09])
-    named = {"mass": robot.mass, "inertia": inertia, "pattern": robot.pattern, "z_axis": "up", **changes}
-    return cspr_jax.platform(robot.base, robot.platform, centre_of_mass=robot.arm, **named)
-
-
-def quaternions_of(rotations):
-    return Rotation.from_matrix(rotations).as_quat(scalar_first=True)
 
 
 def test_self_calibration_is_that_of_scipy():

@@ -330,11 +330,22 @@ def test_steps_along_a_motion_are_continuous():
 
 
 MISTAKES = {
-    "shape": (([1.0, 1.0],), {}, r'^lengths = "shape \(2,\)": must be finite numbers of shape \(3,\) or \(n, 3\)$'),
-    "negative": (([1.0, -1.0, 1.0],), {}, r"^lengths\[0\] = \[1.0, -1.0, 1.0\]: must be lengths > 0, at most 1e6 m$"),
+    "shape": (([1.0, 1.0],), {}, r"^lengths: an array of shape \(2,\): must be \(3,\), one a cable, or \(n, 3\)$"),
+    "shapes": (([[1.0, 1.0]],), {}, r"^lengths: an array of shape \(1, 2\): must be \(3,\), one a cable, or \(n, 3\)$"),
+    "negative": (([1.0, -1.0, 1.0],), {}, r"^lengths\[0, 1\] = -1.0: must be a length > 0, at most 1e6 m$"),
+    "slack": (
+        ([1.0, 1.0, 1.0],),
+        {"equilibrium": True, "weights": [1.0, 1.0, 1.0]},
+        "^weights: given: must be absent beside equilibrium, which has none$",
+    ),
+    "loose": (
+        ([1.0, 1.0, 1.0],),
+        {"equilibrium": True, "tolerance": 0.1},
+        "^tolerance: given: must be absent beside equilibrium, which has none$",
+    ),
     "nan": (([1.0, np.nan, 1.0],), {}, r"^lengths = nan: must be finite numbers"),
     "winch": (([1.0, 1.0, 1.0],), {"angles": True}, r"^angles = true: must be False: the robot has no \[winch\]"),
-    "start": (([1.0, 1.0, 1.0],), {"start": np.zeros((2, 3))}, r'^start = "shape \(2, 3\)": must be'),
+    "start": (([1.0, 1.0, 1.0],), {"start": np.zeros((2, 3))}, r"^start: an array of shape \(2, 3\): must be \(3,\)"),
     "turn": (
         ([1.0, 1.0, 1.0],),
         {"start": [0, 0, 1], "start_orientations": [1, 0, 0, 0]},

@@ -1,6 +1,8 @@
 """Logs of machines: what was put into synthetic ones is found again; tables are read, and mistakes told."""
 
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from cspr_jax.cli import main
 from cspr_jax.config.cable_logs import read_cable_log
 from cspr_jax.errors import ConfigError
 from cspr_jax.machine.logs import delay, disagreement
+from cspr_jax.outputs.logs import log_report
 
 PLACES = [([0.0, 0.0, 1.2], 0.0), ([0.1, 0.05, 1.1], 1.5), ([0.0, 0.1, 1.3], 3.0)]
 WIDE = [([0.0, 0.0, 2.0], 0.0), ([1.0, 0.5, 2.2], 3.0), ([0.0, -0.6, 1.8], 6.0)]
@@ -155,6 +158,26 @@ def test_one_error_among_random_null_vectors():
     assert disagreement.intervals(np.arange(300.0), inside) == [(100.0, 149.0), (200.0, 200.0)]
 
 
+def test_a_log_of_one_cable_and_one_without_poses():
+    """A mass on a guide; and lengths of which no pose is known: dashes in texts, None in JSON, never within."""
+    times = np.arange(4.0)
+    one = {"robot": "lift", "family": "line", "times": times, "rows": np.arange(4), "n_spare": 0, "lengthened": [[]]}
+    one |= {"delay": delay.Delay(np.nan, np.nan, np.nan, np.array([0.01]), False), "length_errors": np.ones((4, 1))}
+    one |= {"position_errors_before": np.ones(4), "position_errors": np.array([0.001, np.nan, 0.003, 0.002])}
+    one |= {"angle_errors": None, "is_found": np.ones(4, bool), "residuals": np.zeros((4, 1)), "disagreement": None}
+    one |= {"tensions": None, "planned_tensions": np.ones((4, 1)), "slack": None, "tolerance": 0.01}
+    log = log_report.ComparedLog(**one)
+    table = json.loads(json.dumps(log_report.log_object(log), allow_nan=False))
+    assert table["disagreeing_cable"] is None and table["delay"] is None and not log.within_tolerance
+    assert table["position_error"] == {"rms": pytest.approx(0.00216024689947), "largest": 0.003, "t": 2.0}
+    assert "cable 1" not in table["disagreement"] and "cannot be told" in log_report.log_lines(log)[1]
+    nothing = np.full(4, np.nan)
+    lost = log_report.ComparedLog(**one | {"position_errors": nothing, "angle_errors": nothing})
+    table = json.loads(json.dumps(log_report.log_object(lost), allow_nan=False))
+    assert table["angle_error"] == table["position_error"] == {"rms": None, "largest": None, "t": None}
+    assert "- mm rms, largest - mm at - s after" in " ".join(log_report.log_lines(lost))
+
+
 def test_angles_of_motors_are_logs(planned, tmp_path):
     spec, rows = planned
     winch = {"drum_radius": 0.02, "gear_ratio": 3.0, "zero_length": 1.0, "direction": [1, -1, 1]}
@@ -167,6 +190,28 @@ def test_angles_of_motors_are_logs(planned, tmp_path):
     assert abs(found.delay.value - 0.02) < 1e-3 and found.position_errors.max() < 0.002
     with pytest.raises(ConfigError, match=r"log.csv: angles = true: must be False: the robot has no \[winch\]"):
         cspr_jax.compare_log(path, spec)
+
+
+def test_angles_and_tensions_of_all_cables_of_pairs(tmp_path):
+    """Six columns of a platform that three winches move: as three, and one slack cable of a pair is seen."""
+    spec = tomllib.loads((Path(cspr_jax.__file__).parent / "catalogue" / "launch-robot.toml").read_text("utf-8"))
+    spec["winch"] = {"drum_radius": 0.02, "zero_length": 0.8, "direction": [1, 1, -1, -1, 1, 1]}
+    plan = _spec(spec, [([0.0, 0.0, -0.8], 0.0), ([0.05, 0.02, -0.75], 1.5), ([0.0, 0.05, -0.85], 3.0)])
+    rows = cspr_jax.plan(plan).rows(500.0)
+    rows["tension"] = rows["tension_each"]
+    times, lengths, tensions = _played(rows, np.random.default_rng(8), late=0.03)
+    angles = np.repeat([1.0, -1.0, 1.0] * (lengths - 0.8) / 0.02, 2, axis=1)
+    is_slack = (times > 1.0) & (times < 1.4)
+    tensions[is_slack, 3] = 0.0
+    found = cspr_jax.compare_log(_written(tmp_path / "log.csv", times, angles, tensions, name="angle"), plan)
+    three = cspr_jax.compare_log(_written(tmp_path / "three.csv", times, angles[:, ::2], name="angle"), plan)
+    assert abs(found.delay.value - 0.03) < 1e-3 and found.delay.value == three.delay.value
+    table = found.to_dict()["cables"]
+    assert [len(row["slack"]) for row in table] == [0, 1, 0]
+    np.testing.assert_allclose(table[1]["slack"][0], [1.0, 1.4], atol=0.02)
+    np.testing.assert_allclose(found.tensions[~is_slack], found.planned_tensions[~is_slack], rtol=0.02)
+    with pytest.raises(ConfigError, match=r"log.csv: columns: 4 of lengths or angles: must be 3, one a cable, or 6$"):
+        cspr_jax.compare_log(_written(tmp_path / "log.csv", times, angles[:, :4], name="angle"), plan)
 
 
 def test_tables_of_all_kinds(tmp_path):
@@ -183,6 +228,7 @@ def test_tables_of_all_kinds(tmp_path):
 
 HEAD = "t,length_1,length_2,length_3\n"
 MISTAKES = {
+    "no number": ("t1,length_1,length_2,length_3\n0,1,1,1\n", "line 1: no column t: must have t, length_1"),
     "cell": (HEAD + "0,1,1,1\n1,1,abc,1\n", 'line 3, column 3: length_2 = "abc": must be a number, or empty for a gap'),
     "count": (HEAD + "0,1,1\n", "line 2: 3 values: must be 4, as in the header"),
     "times": (HEAD + "1,1,1,1\n1,1,1,1\n", "line 3: t = 1: must be more than 1, the time before it"),
@@ -194,6 +240,10 @@ MISTAKES = {
     "empty": ("", "0 lines: must be a header line and rows below it"),
     "gap in time": (HEAD + ",1,1,1\n", "line 2: t is empty: must be a time in each row"),
     "infinite": (HEAD + "0,1,inf,1\n", 'line 2, column 3: length_2 = "inf": must be a finite number'),
+    "negative": (
+        HEAD + "0,1,,1\n1,1,-1,2\n",
+        "line 3: a length of 0 or less: 1 such rows are left out: must have a row with",
+    ),
     "gaps": (HEAD + "0,1,,1\n1,1,,2\n", "every row has gaps: must have a row with numbers for all cables"),
 }
 
@@ -234,8 +284,11 @@ def test_commands(planned, tmp_path, capsys):
     assert found["complete"] and found["count"] == [2] and len(found["solutions"][0]["position"]) == 2
     assert main(["locate", "prototype", "--lengths", "0.1,0.1,0.1"]) == 1
     assert "misses them by up to 0.16 m" in capsys.readouterr().out
+    bad = tmp_path / "bad.csv"
+    bad.write_text("length_1,length_2,length_3\n1.2,1.2,1.2\n\n1.2,-0.1,1.2\n")
     for words, line in (
-        (["--lengths", "1,2"], "prototype: lengths = "),
+        ([str(bad)], f"{bad}: line 4: length_2 = -0.1: must be a length > 0, at most 1e6 m"),
+        (["--lengths", "1,2"], "--lengths: 2 numbers: must be 3, one a cable"),
         (["--lengths", "1,x,3"], "--lengths: 1,x,3: must be finite numbers"),
         ([], "--lengths: missing: one of a file, --lengths and --angles"),
         (["--lengths", "1,1,1", "--start", "1,2"], "--start: 1,2: must be 3 or 7 finite numbers"),

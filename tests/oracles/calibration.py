@@ -64,3 +64,30 @@ def body_fit(base, points, readings, positions, rotations):
         lambda x: (predicted(x) - readings).ravel(), start, method="trf", xtol=1e-15, ftol=1e-15, gtol=1e-15
     )
     return predicted(best.x), 2.0 * best.cost
+
+
+def tracked_covariance(spools, positions):
+    """Covariance of spools and offsets of a point mass for readings and positions of variance 1.
+
+    The tracker's axes are unknown, and the spools are as near nominal ones as a motion of everything allows: that
+    is a constraint on the linear least squares of all unknowns, solved by its bordered normal equations.
+    """
+    n, count = len(spools), len(positions)
+    own, total = 4 * n, 4 * n + 6 + 3 * count
+    rows = np.zeros((count, n + 3, total))
+    for k, position in enumerate(positions):
+        rays = position - spools
+        units = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        of_pose = slice(own + 6 + 3 * k, own + 9 + 3 * k)
+        for i in range(n):
+            rows[k, i, 3 * i : 3 * i + 3], rows[k, i, 3 * n + i] = -units[i], -1.0
+        rows[k, :n, of_pose] = units
+        # Seen positions, in the robot's axes: shifts and turns of the tracker, and the pose itself.
+        rows[k, n:, own : own + 3] = rows[k, n:, of_pose] = np.eye(3)
+        rows[k, n:, own + 3 : own + 6] = np.cross(np.eye(3), position).T
+    matrix = rows.reshape(-1, total)
+    motions = np.zeros((6, total))
+    motions[:3, : 3 * n] = np.tile(np.eye(3), n)
+    motions[3:, : 3 * n] = np.cross(np.eye(3)[:, None], spools).reshape(3, -1)
+    border = np.block([[matrix.T @ matrix, motions.T], [motions, np.zeros((6, 6))]])
+    return np.linalg.inv(border)[:own, :own]

@@ -134,9 +134,9 @@ def limits_file(path: Path | None) -> dict[str, Any] | None:
     return _limit_values(read_toml(path), path)
 
 
-def _limit_values(given: Mapping[str, Any], source: object) -> dict[str, Any]:
+def _limit_values(spec: Mapping[str, Any], source: object) -> dict[str, Any]:
     # The keys of [limits] that are given, at the top or in a table of this name.
-    values = plain_values(given)
+    values = plain_values(spec)
     values = {**values.pop("limits"), **values} if isinstance(values.get("limits"), dict) else values
     return {name: value for name, value in dict(checked(LimitTable, values, source)).items() if value is not None}
 

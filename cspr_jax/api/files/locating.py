@@ -157,6 +157,9 @@ def located(
         values, lines = values[rows], log.lines[rows]
     else:
         values, lines = np.array([measured]), None
+        if len(measured) != robot.n_cables:
+            option = "--angles" if angles else "--lengths"
+            raise ConfigError(option, f"{len(measured)} numbers: must be {robot.n_cables}, one a cable")
     settings: dict[str, Any] = {}
     if start is not None:
         settings["start"] = start[:3]

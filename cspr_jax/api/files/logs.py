@@ -109,7 +109,8 @@ def compare_log(
 
     Args:
         log: CSV with a column t, lengths `length_1`, ... or angles `angle_1`, ... of the motors, and tensions
-            `tension_1`, ... if there are any; see `cspr_jax.config.cable_logs`.
+            `tension_1`, ... if there are any; see `cspr_jax.config.cable_logs`. A platform in three parallel pairs of
+            cables has a column a pair, or one a cable.
         plan: plan file, a dictionary of what it holds, or a plan.
         tolerance: largest position error that is allowed after the delay, m; None: any.
         max_delay: largest delay that is looked for, s, before and behind the plan.
@@ -140,11 +141,12 @@ def _lengths(read: CableLog, robot: Any, pairs: Any) -> np.ndarray:
     values = np.asarray(read.angles if read.lengths is None else read.lengths)
     if pairs is not None and values.shape[1] == 2 * robot.n_cables:
         values = values[:, pairs.cables].mean(2)
+    if values.shape[1] != robot.n_cables:
+        allowed = f"must be {robot.n_cables}, one a cable" + (f", or {2 * robot.n_cables}" if pairs is not None else "")
+        raise InputError("columns", None, allowed, problem=f"{values.shape[1]} of lengths or angles")
     if read.lengths is None:
         is_given = np.isfinite(values)
         values = np.where(is_given, lengths_of(robot, np.where(is_given, values, 0.0), is_angle=True), np.nan)
-    if values.shape[1] != robot.n_cables:
-        raise InputError("columns", values.shape[1], f"{robot.n_cables}, one a cable")
     return values
 
 
@@ -163,9 +165,8 @@ def _compared(
     if not (-max_delay <= times[0] <= curves.duration + max_delay):
         warnings.append(f"times begin at {times[0]:.9g} s: counted from the first row")
         times = times - times[0]
-    rows = np.flatnonzero(np.isfinite(lengths).all(1) & (lengths > 0.0).all(1))
-    if not len(rows):
-        raise ConfigError(path, "every row has gaps: must have a row with numbers for all cables")
+    lengths = _positive(path, read, lengths, warnings)
+    rows = np.flatnonzero(np.isfinite(lengths).all(1))
     largest = min(max_delay, curves.duration)
     delay = delay_of(times, lengths, curves.lengths, curves.rates, largest)
     if delay.is_at_edge:
@@ -183,7 +184,7 @@ def _compared(
     angle = 2.0 * np.arccos(cosine) if search.row.is_body else None
     picked = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(int))
     disagreement, longer = _disagreement(search, poses, picked)
-    tension, slack = _slack(read, curves, times, shift)
+    tension, slack = _slack(read, curves, planned.robot_file.pairs, times, shift)
     lengthened: list[list[tuple[float, float]]] = [[] for _ in range(robot.n_cables)]
     if longer is not None:
         lengthened = [intervals(times[rows[picked]], longer[:, k]) for k in range(robot.n_cables)]
@@ -210,6 +211,19 @@ def _compared(
     )
 
 
+def _positive(path: Path, read: CableLog, lengths: np.ndarray, warnings: list[str]) -> np.ndarray:
+    # Lengths with gaps in place of rows that hold one of 0 or less; refuses logs in which no row is left.
+    is_wrong = np.any(lengths <= 0.0, axis=1)
+    lengths, words = np.where(is_wrong[:, None], np.nan, lengths), "every row has gaps"
+    if is_wrong.any():
+        k = int(is_wrong.argmax())
+        words = f"line {read.lines[k]}: a length of 0 or less: {np.count_nonzero(is_wrong)} such rows are left out"
+        warnings.append(words)
+    if not np.isfinite(lengths).all(1).any():
+        raise ConfigError(path, f"{words}: must have a row with numbers for all cables")
+    return lengths
+
+
 def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, np.ndarray | None]:
     robot = search.robot
     if robot.n_cables == robot.dof:
@@ -231,11 +245,17 @@ def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, 
 
 
 def _slack(
-    read: CableLog, curves: PlanCurves, times: np.ndarray, shift: float
+    read: CableLog, curves: PlanCurves, pairs: Any, times: np.ndarray, shift: float
 ) -> tuple[np.ndarray | None, list[list[tuple[float, float]]] | None]:
+    # Measured tensions, of pairs their sums, and intervals in which a cable, or one of a pair, is slack.
     tensions, planned = read.tensions, curves.tensions(times - shift)
-    if tensions is None or tensions.shape != planned.shape:
+    if tensions is None:
         return None, None
+    if pairs is not None and tensions.shape[1] == 2 * planned.shape[1]:
+        each, planned = tensions[:, pairs.cables], curves.tensions_each(times - shift)[:, pairs.cables]
+        tensions = each.sum(2)
+    else:
+        each, planned = tensions[:, :, None], planned[:, :, None]
     with np.errstate(invalid="ignore"):
-        is_slack = tensions <= SLACK * planned
+        is_slack = np.any(each <= SLACK * planned, axis=2)
     return tensions, [intervals(times, is_slack[:, k]) for k in range(tensions.shape[1])]

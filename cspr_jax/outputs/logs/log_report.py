@@ -101,7 +101,7 @@ def _peak(log: ComparedLog, errors: np.ndarray) -> dict[str, float]:
     if not np.isfinite(errors).any():
         return dict.fromkeys(("rms", "largest", "t"), math.nan)
     k = int(np.nanargmax(errors))
-    rms = float(np.sqrt(np.mean(errors**2)))
+    rms = float(np.sqrt(np.nanmean(errors**2)))
     return {"rms": rms, "largest": float(errors[k]), "t": float(log.times[log.rows[k]])}
 
 

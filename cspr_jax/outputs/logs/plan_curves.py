@@ -26,7 +26,8 @@ class PlanCurves:
         duration: s.
         lengths: (n, m) lengths of the cables at times, m.
         rates: (n, m) m/s; 0 before and behind the plan.
-        tensions: (n, m) N.
+        tensions: (n, m) N; of a pair of cables, their sum.
+        tensions_each: (n, 2 m) N, of each cable of pairs; without pairs the same as `tensions`.
         poses: positions of the mass centre (n, 3), m, and quaternions (n, 4).
     """
 
@@ -34,6 +35,7 @@ class PlanCurves:
     lengths: Curve
     rates: Curve
     tensions: Curve
+    tensions_each: Curve
     poses: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -66,10 +68,11 @@ def curves_of(plan: PlannedMotions) -> PlanCurves:
     def moving(at: np.ndarray) -> np.ndarray:
         return np.where(((at >= 0.0) & (at <= end))[:, None], rates(np.clip(at, 0.0, end)), 0.0)
 
-    def tensions(at: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(at, times, column) for column in columns["tension"].T], axis=1)
+    def between(rows: np.ndarray) -> Curve:
+        return lambda at: np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
 
-    return PlanCurves(end, held(lengths), moving, tensions, poses)
+    tensions, each = between(columns["tension"]), between(columns.get("tension_each", columns["tension"]))
+    return PlanCurves(end, held(lengths), moving, tensions, each, poses)
 
 
 def _quaternions(plan: PlannedMotions, times: np.ndarray, columns: dict[str, np.ndarray]) -> Curve:
