@@ -32,8 +32,8 @@ def with_mean_torques(problem: Problem, legs: Sequence[JoinedLeg], scene: Callab
 
     largest, totals = np.asarray(limit), mean_torques(problem, motions)
     allowed = largest * (1.0 + TOUCHED)
-    is_over = totals.rms(totals.low) > allowed
-    is_open = (totals.rms(totals.high) > allowed) & ~is_over
+    is_over = totals.rms_low > allowed
+    is_open = ~(totals.rms_high <= allowed) & ~is_over
     at_fault = _at_fault(totals.rms_of_each, largest, is_over if is_over.any() else is_open)
     results, first = list[JoinedLeg](), 0
     for leg in legs:
@@ -41,7 +41,8 @@ def with_mean_torques(problem: Problem, legs: Sequence[JoinedLeg], scene: Callab
         proofs, verdict = np.array(answers.proof), np.array(answers.verdict, FLAGS)
         for i in np.flatnonzero(rows & [proof is None for proof in proofs]).tolist():
             proofs[i] = proof_of(problem, leg.motions[i], scene())
-        for i in range(len(proofs)):
+        # A segment that is not at fault stays feasible, and so does its proof.
+        for i in np.flatnonzero(rows | (not at_fault.any())).tolist():
             if proofs[i] is not None:
                 proofs[i] = extended(proofs[i], totals, largest)
         verdict[rows] |= MEAN if is_over.any() else FLAGS(Verdict.UNDECIDED.value)

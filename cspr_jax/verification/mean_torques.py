@@ -57,14 +57,25 @@ class MeanTorques(NamedTuple):
     high: np.ndarray
     durations: np.ndarray
 
-    def rms(self, side: Float[np.ndarray, "n_motions n_cables"]) -> Float[np.ndarray, "n_cables"]:
-        """Root mean squares over all motions."""
-        return np.sqrt(side.sum(0) / self.durations.sum())
+    @property
+    def rms_low(self) -> Float[np.ndarray, "n_cables"]:
+        """Lower bounds of the root mean squares over all motions; 0 where nothing is known."""
+        return np.nan_to_num(self._rms(self.low), nan=0.0, posinf=np.inf)
+
+    @property
+    def rms_high(self) -> Float[np.ndarray, "n_cables"]:
+        """Upper bounds of the root mean squares over all motions; inf where nothing is known."""
+        return np.nan_to_num(self._rms(self.high), nan=np.inf, posinf=np.inf)
 
     @property
     def rms_of_each(self) -> np.ndarray:
-        """Lower bounds of the root mean squares over each motion, (n_motions, n_cables)."""
-        return np.sqrt(self.low / self.durations[:, None])
+        """Lower bounds of the root mean squares over each motion, (n_motions, n_cables); 0 where nothing is known."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.nan_to_num(np.sqrt(self.low / self.durations[:, None]), nan=0.0, posinf=0.0)
+
+    def _rms(self, side: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.sqrt(side.sum(0) / self.durations.sum())
 
 
 def mean_torques(problem: Problem, motions: Sequence[Any]) -> MeanTorques:
@@ -78,10 +89,10 @@ def mean_torques(problem: Problem, motions: Sequence[Any]) -> MeanTorques:
     while True:
         sums = [_sums(motion, side, len(motions)) for side in (low, high)]
         totals = MeanTorques(sums[0], sums[1], durations)
-        is_open = (totals.rms(totals.low) <= limit) & (totals.rms(totals.high) > limit)
-        if not is_open.any() or len(motion) > MAX_BLOCKS:
+        is_open = ~(totals.rms_low > limit) & ~(totals.rms_high <= limit)
+        gap = (high - low)[:, is_open].max(1, initial=0.0)
+        if not gap.max(initial=0.0) > 0.0 or len(motion) > MAX_BLOCKS:
             return totals
-        gap = (high - low)[:, is_open].max(1)
         wide = gap >= WIDE * gap.max()
         middle = 0.5 * (start + end)[wide]
         halves = (
@@ -113,7 +124,8 @@ def _integrals(
             low[rows], high[rows] = 0.0, np.inf
             continue
         sides = in_batches(kernel, motions[i].bounds(start[rows], end[rows]), batch_size=BATCH)
-        low[rows], high[rows] = (side * (end - start)[rows, None] for side in sides)
+        width = (end - start)[rows, None]
+        low[rows], high[rows] = (np.where(width == 0.0, 0.0, side * width) for side in sides)
     return low, high
 
 
@@ -161,8 +173,8 @@ def extended(case: MotionProof, totals: MeanTorques, limit: Float[np.ndarray, "n
     nothing = [np.empty((0, 2))] * count
     proof = dataclasses.replace(
         usual,
-        low=np.append(usual.low, limit - totals.rms(totals.high)),
-        high=np.append(usual.high, limit - totals.rms(totals.low)),
+        low=np.append(usual.low, limit - totals.rms_high),
+        high=np.append(usual.high, limit - totals.rms_low),
         when=np.append(usual.when, np.full(count, np.nan)),
         failing=usual.failing + nothing,
         open=usual.open + nothing,

@@ -18,6 +18,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.attained import attained
 from cspr_jax.verification.criteria import CriterionParts
+from cspr_jax.verification.mean_torques import MeanTorques, mean_torques
 from cspr_jax.verification.proved_answers import proof_of
 
 MOTORS = CriterionParts(usual=False, motors=True, contacts=False)
@@ -167,7 +168,32 @@ def test_wrong_limits_are_refused_in_one_line(winch, more, words):
 
 
 def test_functions_without_such_a_proof_refuse_them():
-    robot = cspr_jax.with_cables(cspr_jax.point_mass(SPOOLS, mass=0.2), winch=WINCH | {"motor_speed_max": 3.0})
+    plain = cspr_jax.point_mass(SPOOLS, mass=0.2)
+    robot = cspr_jax.with_cables(plain, winch=WINCH | {"motor_speed_max": 3.0})
     with pytest.raises(cspr_jax.errors.InputError, match="does not exist yet for limits of winches"):
         cspr_jax.minimum_arcs(robot, [[0.1, 0.1, 1.4]], z0=1.4)
     assert dataclasses.asdict(robot.limits)["motor_speed_max"].tolist() == [3.0] * 3
+    line = WINCH | {"motor_stall_torque": 0.1, "motor_no_load_speed": 100.0}
+    with pytest.raises(cspr_jax.errors.InputError, match=r"follows from winch\.motor_stall_torque"):
+        cspr_jax.minimum_arcs(cspr_jax.with_cables(plain, winch=line), [[0.1, 0.1, 1.4]], z0=1.4)
+
+
+def test_only_segments_at_fault_are_refused():
+    """The first segment alone takes more than the root mean square that is allowed, and so does the plan."""
+    poses = [pose | {"time": time} for pose, time in zip(PLAN["pose"], (0.0, 1.0, 3.0), strict=True)]
+    free = cspr_jax.plan(_plan(WINCH | {"motor_torque_rms_max": 9.0}, pose=poses))
+    means = mean_torques(free.problem, [motion for leg in free.legs for motion in leg.motions])
+    limit = 0.97 * means.rms_low
+    assert (means.rms_of_each[1] < limit).all() and (limit < means.rms_of_each[0]).all()
+    plan = cspr_jax.plan(_plan(WINCH | {"motor_torque_rms_max": limit.tolist()}, pose=poses))
+    first, second = plan.answers.proof
+    assert plan.is_feasible.tolist() == [False, True]
+    assert second.is_feasible and first.verdict.text == "motor_over_torque_rms"
+    assert plan.causes[1] == () and plan.causes[0][0].criterion == "motor_over_torque_rms"
+
+
+@pytest.mark.parametrize("duration", [0.0, np.nan])
+def test_means_over_no_time_are_open(duration):
+    """Neither proved nor refuted."""
+    totals = MeanTorques(np.zeros((1, 2)), np.zeros((1, 2)), np.array([duration]))
+    assert (totals.rms_low == 0.0).all() and np.isposinf(totals.rms_high).all() and (totals.rms_of_each == 0.0).all()
