@@ -109,7 +109,7 @@ def workspace(  # noqa: PLR0913
     check_in_plane("positions", points, is_planar=PATTERNS[robot.pattern].is_planar)
     with double_precision():
         centred_robot, frame = centred(robot)
-        limits = _limits(robot, tension_min, tension_max)
+        limits = _limits(robot, tension_min, tension_max, accelerates=bool(acceleration))
         loads = required_wrenches(
             centred_robot, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
@@ -124,12 +124,12 @@ def check_kind(robot) -> None:
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
 
 
-def _limits(robot, tension_min, tension_max) -> Limits:
+def _limits(robot, tension_min, tension_max, *, accelerates: bool) -> Limits:
     if tension_max is not None and np.ndim(tension_max) == 0:  # inf must be given for each cable
         allowed = f"a number > 0, or {robot.n_cables}: one a cable"
         tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
     bounds = Limits(tension_min=tension_min, tension_max=tension_max)
-    return static_limits(robot, limits_over(robot, bounds, any_tensions=True, motors=True))
+    return static_limits(robot, limits_over(robot, bounds, any_tensions=True, motors=True), accelerates=accelerates)
 
 
 def kernel_poses(
@@ -336,7 +336,7 @@ def available_accelerations(
     check_in_plane("positions", points, is_planar=robot.dof == PLANAR)
     with double_precision():
         tensions: dict[str, Any] = {"tension_min": tension_min, "tension_max": tension_max}
-        limits = static_limits(robot, limits_over(robot, Limits(**tensions), motors=True))
+        limits = static_limits(robot, limits_over(robot, Limits(**tensions), motors=True), accelerates=True)
         prepared_robot, frame = prepared(robot)
         allowed = touchable_limits(prepared_robot, limits)
         faces, wider = (faces_of(prepared_robot, each, frame.inward(points)) for each in (limits, allowed))

@@ -20,6 +20,8 @@ from cspr_jax.robots.model.winch_numbers import LINE, LOAD
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
+TORQUES = ("motor_torque_max", "motor_torque_rms_max")
+
 
 def limits_of(
     robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
@@ -99,8 +101,17 @@ def check_no_motors(limits: Limits, at: str = "") -> None:
     for row in LIMITS:
         value = getattr(limits, row.name)
         if row.of_winch and value is not None:
-            why = "absent (what is asked for does not exist yet for limits of winches: plans, checks and some maps do)"
-            raise InputError(f"{at}{row.name}", np.unique(np.asarray(value)).tolist(), why)
+            why = "absent (what is asked for does not exist yet for limits of winches: plans, checks and some maps do"
+            raise InputError(f"{at}{row.name}", _shown(value), f"{why}{_of_line(row.name, value)})")
+
+
+def _shown(value: Any) -> Any:
+    return np.unique(np.asarray(value)).tolist()
+
+
+def _of_line(name: str, value: Any) -> str:
+    # Users may not know a limit that the line of a motor sets.
+    return f"; it follows from winch.{LINE}" if name == LOAD and (np.asarray(value) == 1.0).all() else ""
 
 
 def check_no_means(limits: Limits, at: str = "") -> None:
@@ -110,8 +121,27 @@ def check_no_means(limits: Limits, at: str = "") -> None:
         raise InputError(f"{at}motor_torque_rms_max", value, "absent: only plans and checks of one motion take it")
 
 
-def static_limits(robot: Any, limits: Limits) -> Limits:
+def _refuse_of_motion(robot: Any, limits: Limits, accelerates: bool, moves: bool) -> None:
+    # Refuse limits of winches that depend on speeds or accelerations of motors, which poses at rest do not have.
+    winches, reasons = robot.winches, dict[str, str]()
+    if winches is None:
+        return
+    if accelerates and np.asarray(winches.motor_inertia).any():
+        reasons |= dict.fromkeys((*TORQUES, LOAD, "motor_power_max"), "accelerations: motor_inertia takes torque")
+    if moves and (np.asarray(winches.viscous_friction).any() or np.asarray(winches.motor_inertia).any()):
+        reasons |= dict.fromkeys(TORQUES, "speeds: viscous_friction and motor_inertia take torque")
+    if moves:
+        reasons |= dict.fromkeys(("motor_power_max", LOAD), "speeds, on which it depends")
+        reasons |= {"motor_speed_max": "speeds, on drums with layers"} if winches.layers is not None else {}
+    for name, reason in reasons.items():
+        value = getattr(limits, name)
+        if value is not None:
+            raise InputError(name, _shown(value), f"absent beside {reason}{_of_line(name, value)}")
+
+
+def static_limits(robot: Any, limits: Limits, *, accelerates: bool = False, moves: bool = False) -> Limits:
     """Limits of poses at rest, where limits of torque, in the worse direction of friction, are limits of tensions."""
+    _refuse_of_motion(robot, limits, accelerates, moves)
     largest = {"motor_torque_max": limits.motor_torque_max, "motor_torque_rms_max": limits.motor_torque_rms_max}
     if limits.motor_load_max is not None:
         largest["motor_load_max"] = limits.motor_load_max * robot.winches.stall_torque
@@ -121,13 +151,13 @@ def static_limits(robot: Any, limits: Limits) -> Limits:
     for name, torque in torques.items():
         if robot.winches.layers is not None:
             allowed = "absent at rest on drums with layers, whose torques depend on lengths"
-            raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
+            raise InputError(name, _shown(getattr(limits, name)), allowed + _of_line(name, getattr(limits, name)))
         winches = robot.winches
         arm = np.asarray(winches.drum_radius / (winches.gear_ratio * winches.efficiency))
         high = np.minimum(high, (torque - np.asarray(winches.friction)) / arm)
         if not (high > low).all():
             allowed = "enough for the friction of each winch and for its cable's smallest tension"
-            raise InputError(name, np.unique(np.asarray(getattr(limits, name))).tolist(), allowed)
+            raise InputError(name, _shown(getattr(limits, name)), allowed + _of_line(name, getattr(limits, name)))
     limits = without_motors(limits)
     return dataclasses.replace(limits, tension_max=as_float64(high)) if torques else limits
 

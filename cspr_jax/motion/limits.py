@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
@@ -18,6 +19,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winches import Winches, largest_radii
 from cspr_jax.schema.limits import LIMITS, Limit
 from cspr_jax.schema.verdicts import Verdict
 
@@ -42,6 +44,32 @@ def without_motors(limits: Limits) -> Limits:
     """Limits without those of winches."""
     names = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
     return dataclasses.replace(limits, **dict.fromkeys(names)) if names else limits
+
+
+def search_limits(robot: AnyRobot, limits: Limits) -> Limits:
+    """Limits for searches, without motors: at these cable speeds no motor is too fast, on no layer of its drum."""
+    return _with_motor_speeds(limits, robot.winches, lambda winches: winches.drum_radius)
+
+
+def necessary_limits(robot: AnyRobot, limits: Limits) -> Limits:
+    """Limits for lower bounds, without motors: motions that keep the limits of motors keep these cable speeds."""
+    return _with_motor_speeds(limits, robot.winches, largest_radii)
+
+
+def _with_motor_speeds(limits: Limits, winches: Winches | None, radii: Callable[[Winches], Array]) -> Limits:
+    plain, largest = without_motors(limits), limits.motor_speed_max
+    if winches is None or largest is None:
+        return plain
+    maximum = np.asarray(largest * radii(winches) / winches.gear_ratio)
+    if limits.cable_speed_max is not None:
+        maximum = np.minimum(maximum, limits.cable_speed_max)
+    return dataclasses.replace(plain, cable_speed_max=as_float64(maximum))
+
+
+def are_of_motors(limits: Limits, searched: Limits) -> Bool[np.ndarray, "n_cables"]:
+    """Tell which cable speeds of `search_limits` are those of the motors."""
+    maximum = np.asarray(searched.cable_speed_max)
+    return np.ones(maximum.shape, bool) if limits.cable_speed_max is None else maximum < limits.cable_speed_max
 
 
 def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:

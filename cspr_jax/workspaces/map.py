@@ -15,6 +15,7 @@ from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.motion.given_limits import static_limits
+from cspr_jax.motion.limits import are_of_motors, search_limits
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.robots.cables import AnyRobot
@@ -49,10 +50,11 @@ class WorkspaceMap(GridMap):
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         self._workspace = spec.workspace or WorkspaceTable()
         self._refuse_unused()
-        self._limits = build_limits(robot_file, spec.limits, file)
+        limits = build_limits(robot_file, spec.limits, file)
         self._robot = centred(build_robot(robot_file, spec.trajectory, file))[0]
+        accelerates, moves = bool(self._workspace.acceleration), bool(self._speed_keys)
         try:
-            self._limits = static_limits(self._robot, self._limits)
+            self._limits = static_limits(self._robot, limits, accelerates=accelerates, moves=moves)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
         self._row = PATTERNS[self._robot.pattern]
@@ -75,7 +77,7 @@ class WorkspaceMap(GridMap):
             all_robots = self._all_robots(robot_file, names)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
-        around, speeds = self._around(robot_file), self._speeds(robot_file)
+        around, speeds = self._around(robot_file), self._speeds(robot_file, limits)
         is_centre = self._workspace.point == "mass-centre"
         is_elastic = FREQUENCY in (spec.run.store or ())
         self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre, is_elastic)
@@ -94,9 +96,12 @@ class WorkspaceMap(GridMap):
             return None
         return build_scene(self._robot, robot_file, self._frame, self._workspace, self._file, at="workspace.")
 
-    def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
-        workspace, maximum = self._workspace, self._limits.cable_speed_max
-        speed_keys = [name for name in ("speed", "angular_speed") if getattr(workspace, name) is not None]
+    @property
+    def _speed_keys(self) -> list[str]:
+        return [name for name in ("speed", "angular_speed") if getattr(self._workspace, name) is not None]
+
+    def _speeds(self, robot_file: RobotFile, limits: Limits) -> CableSpeeds | None:
+        workspace, speed_keys = self._workspace, self._speed_keys
         if not speed_keys:
             if getattr(self._keys.limits, SPEED) is not None:
                 allowed = "must be absent without workspace.speed and workspace.angular_speed: cells are at rest"
@@ -106,10 +111,13 @@ class WorkspaceMap(GridMap):
             if name in speed_keys and not has:
                 why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
-        if maximum is None:
-            raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without limits.cable_speed_max")
+        searched = search_limits(self._robot, limits)
+        if searched.cable_speed_max is None:
+            why = "limits.cable_speed_max or motor_speed_max"
+            raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without {why}")
         speed, angular_speed = workspace.speed or 0.0, workspace.angular_speed or 0.0
-        return cable_speeds(self._robot, np.asarray(maximum), speed=speed, angular_speed=angular_speed)
+        maximum, of_motors = np.asarray(searched.cable_speed_max), are_of_motors(limits, searched)
+        return cable_speeds(self._robot, maximum, of_motors, speed=speed, angular_speed=angular_speed)
 
     def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # Quaternions (k, 4) in the kernels' axes.

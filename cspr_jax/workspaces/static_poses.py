@@ -94,7 +94,7 @@ class RestPoses:
             columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
             verdict |= flags(distances)
         for name, flag, slack, missed in self.limited(origins, quaternions):
-            verdict |= np.where((slack < -missed).any(1), flag, 0).astype(FLAGS)
+            verdict |= np.bitwise_or.reduce(np.where(slack < -missed, flag, 0).astype(FLAGS), axis=1)
             columns[name] = slack.min(1)
         return {"verdict": conjunction(verdict), **columns}
 
@@ -122,8 +122,8 @@ class RestPoses:
 
     def limited(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
-    ) -> Iterator[tuple[str, Verdict, np.ndarray, np.ndarray]]:
-        """Quantity, flag, slacks and allowance of each limit."""
+    ) -> Iterator[tuple[str, Verdict | np.ndarray, np.ndarray, np.ndarray]]:
+        """Quantity, flag or flags, slacks and allowance of each limit."""
         centres = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             slack, radius = float(self.limits.floor) - self._depths(centres, quaternions), spool_radius(self.robot)
@@ -134,7 +134,7 @@ class RestPoses:
             yield "length_margin", Verdict.CABLE_TOO_LONG, slack, TOUCHED * longest
         if self.speeds is not None:
             slack = self.speeds.margins(origins, quaternions)
-            yield "speed_margin", Verdict.CABLE_TOO_FAST, slack, TOUCHED * self.speeds.maximum
+            yield "speed_margin", self.speeds.flags, slack, TOUCHED * self.speeds.maximum
 
 
 def over_orientations(

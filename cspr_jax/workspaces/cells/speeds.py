@@ -14,10 +14,11 @@ import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64, unit_vectors
-from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces.cells.cell_proofs import cable_wrenches
 from cspr_jax.workspaces.cells.shifts import Shifts
 from cspr_jax.workspaces.poses import geometry
@@ -34,12 +35,20 @@ class CableSpeeds:
         speed: required speed of the origin, m/s.
         angular_speed: required angular speed, rad/s.
         maximum: (n_cables,) largest speeds of the cables, m/s.
+        of_motors: (n_cables,) whether these are the largest speeds of the motors.
     """
 
     robot: AnyRobot
     speed: float
     angular_speed: float
     maximum: np.ndarray
+    of_motors: np.ndarray | bool = False
+
+    @property
+    def flags(self) -> Int[np.ndarray, "n_cables"]:
+        """Flags of verdicts where each cable is too fast."""
+        flags = np.where(self.of_motors, Verdict.MOTOR_TOO_FAST, Verdict.CABLE_TOO_FAST)
+        return np.broadcast_to(flags, self.maximum.shape).astype(FLAGS)
 
     def margins(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
@@ -85,9 +94,12 @@ class CableSpeeds:
         return moved.units * (speed + arms * self.angular_speed)
 
 
-def cable_speeds(robot: AnyRobot, maximum: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
+def cable_speeds(
+    robot: AnyRobot, maximum: np.ndarray, of_motors: np.ndarray | bool = False, *, speed: float, angular_speed: float
+) -> CableSpeeds:
     """Required velocities of an effector, with its arms taken from the origin of the platform frame."""
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
         robot = dataclasses.replace(robot, platform_points=as_float64(points))
-    return CableSpeeds(robot, speed, angular_speed, np.broadcast_to(np.asarray(maximum, float), (robot.n_cables,)))
+    largest = np.broadcast_to(np.asarray(maximum, float), (robot.n_cables,))
+    return CableSpeeds(robot, speed, angular_speed, largest, of_motors)
