@@ -60,12 +60,14 @@ class Leg(abc.ABC):
 
     Fields:
         step: step between the numbers of arcs that a segment can have; 0: its motions have no arcs.
+        knows_motor_speeds: whether its durations keep limits of speeds of motors, which it does not prove.
 
     Raises:
         ConfigError: poses, or keys of the plan, that the family cannot use.
     """
 
     step: ClassVar[int] = 0
+    knows_motor_speeds: ClassVar[bool] = False
     point: str | None = None  # point of the platform whose positions motion files give, if they say so
 
     def __init__(self, waypoints: Waypoints) -> None:

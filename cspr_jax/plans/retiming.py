@@ -19,6 +19,7 @@ from cspr_jax.families.paths.leg import Ride, cut, section_answer
 from cspr_jax.families.paths.retraced import Retraced, retraced
 from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.motion import Motion, states_at
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.plans.planning import PlannedMotions, with_motions
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.attained import with_attained
@@ -32,6 +33,9 @@ AWAY = 1e-6  # m; if the motion is farther from the planned path, its grid is do
 DOUBLINGS = 3  # largest number of grids tried, the first one included
 # Accelerations at a pose may jump by this fraction of gravity without a warning.
 JUMPS = 1e-6
+# Why motions stay as planned.
+UNPROVED = "no faster motion is proved"
+OF_MEANS = "the full plan exceeds motor_torque_rms_max with faster motions"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,10 +96,16 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     trial = [chained(splines) if splines else motion for splines, motion in zip(parts, motions, strict=True)]
     proved = proved_answers(problem, trial, scene, _feeds_along(faster, len(motions)))
     moves = np.array([len(splines) > 0 for splines in parts])
-    is_better = moves & _is_better(plan, proved, faster)
+    is_fast = moves & _is_better(plan, proved, faster)
+    is_better = _keeping_means(plan, trial, motions, is_fast, _groups(faster, len(motions)))
     answers = _answers(plan, faster, _with_planned(plan, scene, proved, motions, np.flatnonzero(~is_better)), is_better)
     chosen = [new if better else old for new, old, better in zip(trial, motions, is_better, strict=True)]
-    lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
+    lines = (
+        _stays(moves & ~is_fast)
+        + _stays(is_fast & ~is_better, OF_MEANS)
+        + _jumps(plan, faster, is_better)
+        + _unbounded(plan, faster)
+    )
     lines += answers.notes("retime: ramp_time")
     return with_motions(plan, with_attained(plan.problem, answers, chosen, scene), chosen, lines, scene)
 
@@ -160,15 +170,42 @@ def _answers(plan: PlannedMotions, faster: Sequence[_Faster], proved: Answers, i
 def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]) -> np.ndarray:
     # Tell which of the n motions replace the planned ones: between two poses at rest, all or none.
     before, after = np.array(plan.answers.duration), answers.duration
-    group = np.arange(len(before))
-    for segments in (one.ride.segments for one in faster):
-        group[np.isin(group, group[segments])] = group[segments].min()
+    group = _groups(faster, len(before))
     better = np.zeros(len(before), bool)
     for name in np.unique(group).tolist():
         rows = group == name
         is_faster = after[rows].sum() < (1.0 - SMALLEST_GAIN) * before[rows].sum() or not plan.is_feasible[rows].all()
         better[rows] = answers.feasible[rows].all() and is_faster
     return better
+
+
+def _groups(faster: list[_Faster], count: int) -> np.ndarray:
+    # Number the groups of segments between two poses at rest, (n,).
+    group = np.arange(count)
+    for segments in (one.ride.segments for one in faster):
+        group[np.isin(group, group[segments])] = group[segments].min()
+    return group
+
+
+def _keeping_means(
+    plan: PlannedMotions, trial: Sequence[Motion], motions: Sequence[Motion], is_better: np.ndarray, group: np.ndarray
+) -> np.ndarray:
+    # Take back the groups with the largest mean torques, one by one, until the full plan keeps their limit.
+    limit, kept = plan.problem.limits.motor_torque_rms_max, is_better.copy()
+    if limit is None:
+        return is_better
+    from cspr_jax.verification.mean_torques import mean_torques  # few plans need it
+
+    largest = np.asarray(limit)
+    while True:
+        chosen = [new if better else old for new, old, better in zip(trial, motions, kept, strict=True)]
+        means = mean_torques(plan.problem, chosen)
+        if (means.rms_high <= largest * (1.0 + TOUCHED)).all():
+            return kept
+        if not kept.any():  # nor does the plan as it was
+            return is_better
+        worst = np.where(kept, (means.rms_of_each / largest).max(1), -1.0).argmax()
+        kept &= group != group[worst]
 
 
 def _with_planned(
@@ -184,9 +221,9 @@ def _with_planned(
     return answers
 
 
-def _stays(is_kept: np.ndarray) -> list[str]:
+def _stays(is_kept: np.ndarray, why: str = UNPROVED) -> list[str]:
     numbers = ", ".join(str(i + 1) for i in np.flatnonzero(is_kept).tolist())
-    return [f"retime: as planned, since no faster motion is proved: to {numbers}"] if numbers else []
+    return [f"retime: as planned, since {why}: to {numbers}"] if numbers else []
 
 
 def _jumps(plan: PlannedMotions, faster: list[_Faster], is_better: np.ndarray) -> list[str]:

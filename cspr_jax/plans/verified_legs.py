@@ -17,8 +17,13 @@ from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.verification.proved_answers import MotionProof, margins_of
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.criteria import CriterionParts
+from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.verifier import Verifier, of_family
+
+LIMITS_ALONE = CriterionParts(contacts=False)
+CABLE, MOTOR = Verdict.CABLE_TOO_FAST, Verdict.MOTOR_TOO_FAST
 
 
 class VerifiedLeg(Leg):
@@ -31,15 +36,15 @@ class VerifiedLeg(Leg):
 
     def check(self, problem: Problem) -> None:
         """Let the family check the problem; see `Leg.check`."""
-        self._leg.check(of_family(problem))
+        self._leg.check(self._plain(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers of the family, which ignores obstacles, pulleys and winches; see `Leg.answers`."""
-        return self._leg.answers(of_family(problem), depths)
+        return self._leg.answers(self._plain(problem), depths)
 
     def warnings(self, problem: Problem) -> list[str]:
         """Warnings of the family; see `Leg.warnings`."""
-        return self._leg.warnings(of_family(problem))
+        return self._leg.warnings(self._plain(problem))
 
     def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
         """Result from the family's answers; see `Leg.result`."""
@@ -47,7 +52,7 @@ class VerifiedLeg(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by proved motions where there are any; see `Leg.join`."""
-        waypoints, plain, prescribed = self.waypoints, of_family(problem), self.waypoints.arcs
+        waypoints, plain, prescribed = self.waypoints, self._plain(problem), self.waypoints.arcs
         has_scene = bool(waypoints.plan_file.obstacle_keys) or problem.robot.pulleys is not None
         verifier = Verifier(problem, scene_of_leg(problem.robot, waypoints) if has_scene else None)
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
@@ -71,7 +76,22 @@ class VerifiedLeg(Leg):
         proofs = verified.proofs
         if not (verifier.parts.usual or verifier.parts.contacts):  # nobody asks for the proofs of limits that are kept
             proofs = [proof if proof is not None and proof.verdict else None for proof in proofs]
-        return _answers(verified.answers, proofs, has_pulleys=has_pulleys), motions
+        answers = self._with_motors(problem, verified.answers, motions)
+        return _answers(answers, proofs, has_pulleys=has_pulleys), motions
+
+    def _with_motors(self, problem: Problem, answers: Answers, motions: list[Motion]) -> Answers:
+        # A family that takes speeds of motors for those of cables blames cables: ask the proof of any motion.
+        is_fast = (answers.verdict & CABLE.value) != 0
+        if problem.limits.motor_speed_max is None or not (self._leg.knows_motor_speeds and is_fast.any()):
+            return answers
+        verdict = np.array(answers.verdict, FLAGS)
+        for i in np.flatnonzero(is_fast).tolist():
+            proved = proof_of(problem, motions[i], parts=LIMITS_ALONE, intervals=False).verdict & (CABLE | MOTOR)
+            verdict[i] = (verdict[i] & ~FLAGS(CABLE.value)) | FLAGS((proved or Verdict.UNDECIDED).value)
+        return dataclasses.replace(answers, verdict=verdict)
+
+    def _plain(self, problem: Problem) -> Problem:
+        return of_family(problem, motor_speeds=self._leg.knows_motor_speeds)
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)

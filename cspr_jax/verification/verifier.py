@@ -152,7 +152,10 @@ class Verifier(NamedTuple):
         return dataclasses.replace(answers, tolerated=proved, not_tolerated=refuted)
 
 
-def of_family(problem: Problem) -> Problem:
+def of_family(problem: Problem, *, motor_speeds: bool = False) -> Problem:
     """A problem without what families ignore, so that robots with and without winches share compiled functions."""
-    robot = dataclasses.replace(problem.robot, pulleys=None, winches=None)
-    return problem._replace(robot=robot, limits=without_motors(problem.limits))
+    limits, kept = without_motors(problem.limits), problem.limits.motor_speed_max
+    if not motor_speeds or kept is None:
+        return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None, winches=None), limits=limits)
+    limits = dataclasses.replace(limits, motor_speed_max=kept)
+    return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None), limits=limits)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
+from cspr_jax.verification.mean_torques import mean_torques
 
 WINCH = {"drum_radius": 0.02, "gear_ratio": 3.0, "friction": 0.005, "efficiency": 0.9, "motor_inertia": 1e-5}
 SPOOLS = [[0.23, -0.13, 0.0], [-0.23, -0.13, 0.0], [0.0, 0.26, 0.0]]
@@ -64,3 +65,25 @@ def test_cells_of_maps_equal_plans():
     plans = [cspr_jax.plan(PLAN | usual | {"pose": pose, "max_arcs": 6}) for pose in poses]
     assert found == [(plan.feasible, plan.to_dict()["segments"][0]["arcs"] or 0) for plan in plans]
     assert [arcs for _, arcs in found] != [1, 2, 2] and any(feasible for feasible, _ in found)
+
+
+@pytest.mark.thorough
+def test_retimed_plans_keep_the_root_mean_square():
+    """Two slow lines: as fast as tensions allow they take too much torque; the one that takes most stays as planned."""
+    poses = [{"position": place} for place in ([0.0, 0.0, 1.3], [0.05, 0.02, 1.2], [0.02, 0.0, 1.25])]
+    robot = PLAN["robot"] | {"tension_max": 2.0}
+    lines = {"schema": 1, "family": "quintic", "max_acceleration": 0.3, "pose": poses}
+
+    def means(plan):
+        return mean_torques(plan.problem, [motion for leg in plan.legs for motion in leg.motions])
+
+    def retimed(largest):
+        plan = cspr_jax.plan(lines | {"robot": robot | {"winch": WINCH | {"motor_torque_rms_max": largest}}})
+        return plan, cspr_jax.retime(plan, grid=40)
+
+    plan, free = retimed(9.0)
+    before, after = means(plan).rms_high.max(), means(free).rms_low.max()
+    assert free.answers.is_retimed.all() and after > 1.1 * before
+    planned, kept = retimed(float(0.3 * after + 0.7 * before))
+    assert planned.feasible and kept.feasible and not kept.answers.is_retimed.all()
+    assert any("motor_torque_rms_max" in line for line in kept.warnings)

@@ -20,9 +20,10 @@ from cspr_jax.launch.launch_result import LaunchResult, launch_result
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, each
 from cspr_jax.motion.motion import Motion
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, search_problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.robots.model.point_mass import AT_P0, spool_radius
+from cspr_jax.verification.verifier import of_family
 
 # Accelerations up to this fraction of gravity count as zero.
 AT_REST = 1e-9
@@ -42,6 +43,8 @@ class _Chosen(NamedTuple):
 class Beziers(Leg):
     """Any positions, joined by Bezier segments; see `Leg`."""
 
+    knows_motor_speeds = True
+
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, which Bezier segments do not have."""
         super().__init__(waypoints)
@@ -54,13 +57,13 @@ class Beziers(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the positions; see `Leg.join`."""
-        points, frame = self._points(problem, z0), self.waypoints.frame
+        points, frame, searched = self._points(problem, z0), self.waypoints.frame, search_problem(problem)
         # Normalise by the depth of P0, else by that of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
-        chosen = self._chosen(problem, points, depth)
-        segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
+        chosen = self._chosen(searched, points, depth)
+        segments = joined_segments(searched, chosen.points, chosen.durations, chosen.first, depth)
         self._refuse_unbounded(problem, segments.motions.time, chosen.points)
-        answers, motions = answers_of(problem, segments), segments.motions
+        answers, motions = answers_of(of_family(problem), segments), segments.motions
         self._check_rests(problem, motions, chosen.first - points[0])
         if self._at is not None:
             answers.release[self._at - self.waypoints.first] = chosen.release

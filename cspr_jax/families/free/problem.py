@@ -13,7 +13,7 @@ from cspr_jax.families.free.search.basis import basis
 from cspr_jax.families.free.search.equations import ValueBounds, bounds, coordinates
 from cspr_jax.families.free.search.objectives import OBJECTIVES, Objective
 from cspr_jax.families.free.search.tasks import Tasks
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, search_problem
 from cspr_jax.numerics.shapes import Bool
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import criteria
@@ -72,8 +72,8 @@ class FreeQuestion:
     def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> FreeQuestion:
         """Take limits from the robot, and the objective from the settings."""
         check_searched(problem)
-        robot = problem.robot
-        limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
+        robot, searched = problem.robot, search_problem(problem).limits
+        limits = bounds(robot, searched, criteria(robot, problem.limits, scene), settings.longest is not None)
         objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
         return cls(problem, scene, poses, limits, objective, settings)
 
@@ -95,8 +95,8 @@ class FreeQuestion:
 
     def tasks(self, intervals: int, samples: int) -> Tasks:
         """The question as a task on some number of intervals."""
-        numbers = basis(intervals, samples)
-        return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
+        numbers, problem = basis(intervals, samples), search_problem(self.problem)
+        return tasks_of(problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
 def more(number: int) -> float:

@@ -13,7 +13,7 @@ from cspr_jax.families.lines.any_limits import LONGER
 from cspr_jax.families.lines.durations import Durations, Rule, by_cells, by_formula, by_search, moving
 from cspr_jax.families.lines.verdicts import acceleration_slack, limits_at_rest, verdicts
 from cspr_jax.motion.limits import limits_set
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, bounding_problem, search_problem
 from cspr_jax.numerics.batches import in_parts
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
@@ -63,8 +63,15 @@ def fastest(
     max_acceleration: float,
     sharp: bool,
 ) -> Fastest:
-    """Fastest motions along straight lines."""
-    how: dict[str, Any] = {"law": law, "rule": rule, "max_acceleration": max_acceleration, "sharp": sharp}
+    """Fastest motions along straight lines; of limits of winches they keep those of speeds."""
+    problem, bounding = search_problem(problem), bounding_problem(problem)
+    how: dict[str, Any] = {
+        "bounding": bounding,
+        "law": law,
+        "rule": rule,
+        "max_acceleration": max_acceleration,
+        "sharp": sharp,
+    }
     if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
         return _fastest(problem, starts, ends, **how)
     parts = in_parts(lambda part: _fastest(problem, starts[part], ends[part], **how), len(starts), PART)
@@ -81,6 +88,7 @@ def _fastest(
     starts: np.ndarray,
     ends: np.ndarray,
     *,
+    bounding: Problem,
     law: str,
     rule: Rule,
     max_acceleration: float,
@@ -115,7 +123,7 @@ def _fastest(
     moves = may_move & np.isfinite(timings.duration)
     indices = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.lower_bound == 0.0)))
     if len(indices) > 0:
-        cells = by_cells(problem, starts[indices], ends[indices], max_acceleration)
+        cells = by_cells(bounding, starts[indices], ends[indices], max_acceleration)
         timings.lower_bound[indices] = np.maximum(timings.lower_bound[indices], cells)
     return Fastest(timings, results, moves)
 

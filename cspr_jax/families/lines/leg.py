@@ -16,6 +16,8 @@ from cspr_jax.schema.verdicts import Verdict
 class TimedLines(Leg):
     """Any positions, joined by straight lines in the least time of their law; see `Leg`."""
 
+    knows_motor_speeds = True
+
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, which a line does not have."""
         super().__init__(waypoints)

@@ -13,7 +13,8 @@ from cspr_jax.families.lines.fastest import fastest
 from cspr_jax.families.lines.motion import TimedLine
 from cspr_jax.families.lines.verdicts import laws_of
 from cspr_jax.motion.answers import Answers
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.limits import are_of_motors
+from cspr_jax.motion.problem import Problem, search_problem
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 
@@ -73,9 +74,21 @@ def timed_lines(
         np.where(moves, timings.ratio, 0.5) * duration,
         np.where(moves, timings.lower_bound, np.nan),
         np.stack([np.where(moves, x + 1, 0) for x in (timings.up, timings.down)], axis=1),
-        names_of(problem.robot, problem.limits),
+        _names(problem),
         margin_unit="m/s^2",
     )
+
+
+def _names(problem: Problem) -> tuple[str, ...]:
+    # Speeds of cables stand for those of motors.
+    limits, searched = problem.limits, search_problem(problem).limits
+    names = names_of(problem.robot, searched)
+    if limits.motor_speed_max is None:
+        return names
+    of_motors = are_of_motors(limits, searched)
+    both = (of_motors.any(), "motor_speed_max"), (not of_motors.all(), "cable_speed_max")
+    shown = " or ".join(name for is_met, name in both if is_met)
+    return tuple(shown if name == "cable_speed_max" else name for name in names)
 
 
 def motions_of(

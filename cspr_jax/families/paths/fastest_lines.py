@@ -16,7 +16,7 @@ from cspr_jax.families.paths.least_time.timed import cell_times
 from cspr_jax.motion.answers import Answers, replaced
 from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.motion import Motion
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, search_problem
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -73,7 +73,7 @@ class FastestLines(Leg):
 
 def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
     # Return the lines along which a motion runs on a grid, the fastest first.
-    paths = discretes(problem, lines, [SectionSettings(MAP_GRID, 0.0)] * len(lines))
+    paths = discretes(search_problem(problem), lines, [SectionSettings(MAP_GRID, 0.0)] * len(lines))
     runs = [motion.run for motion in jumping_motions(paths)]
     times = [
         np.inf if run is None else cell_times(run, path.grid.width).sum() for run, path in zip(runs, paths, strict=True)

@@ -148,8 +148,9 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
             change = 1.0 / radius if limit.is_height else (2.0 if limit.of_mass_centre else 1.0) / maximum
             top = maximum / radius if limit.is_height else 1.0
             bottom = -1.0 if limit.quantity in ("speed", "acceleration") else -np.inf
-            cable = k if limit.per_cable else -1
-            values.append(_Value(bottom, top, limit.flag, limit.flag, cable, change, ORDERS[limit.quantity]))
+            cable, flag = k if limit.per_cable else -1, limit.flag
+            flag |= Verdict.MOTOR_TOO_FAST if limit.quantity == "speed" else Verdict.FEASIBLE
+            values.append(_Value(bottom, top, flag, flag, cable, change, ORDERS[limit.quantity]))
     is_regular, _ = pose_conditions(robot)
     is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
@@ -165,7 +166,8 @@ def bounds(robot: AnyRobot, limits: Limits, criteria: Sequence[Criterion], is_ti
         return np.array(
             [
                 [
-                    value.change
+                    # Speeds of cables stand for those of motors; both are over their limits.
+                    (1.0 / limit.allowed if limit.flag == Verdict.MOTOR_TOO_FAST else value.change)
                     if getattr(value, side) & limit.flag
                     and value.cable in (*(limit.cables or numbers), -1)
                     and np.isfinite(getattr(value, bound))

@@ -16,7 +16,7 @@ from jax import Array
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.motion import common_shape
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, bounding_problem
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -45,6 +45,7 @@ def least_time(
 
 def time_bounds(problem: Problem, motions: list[Spline]) -> Float[np.ndarray, "n"]:
     """Lower bounds of the time of all motions with the same ends."""
+    problem = bounding_problem(problem)
     return np.array([(1.0 - SAFE) * _time_bound(problem, motion) for motion in motions])
 
 

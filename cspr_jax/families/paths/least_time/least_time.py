@@ -17,9 +17,12 @@ from cspr_jax.families.paths.least_time.refusals import NoMotion, refusal
 from cspr_jax.families.paths.least_time.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.families.paths.least_time.tightening import BindingName, CellSlacks, Trial, together
 from cspr_jax.families.paths.least_time.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.limits import are_of_motors
+from cspr_jax.motion.problem import Problem, bounding_problem, search_problem
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime.progress import RateEstimate
 from cspr_jax.runtime.stages import within
+from cspr_jax.schema.verdicts import Verdict
 
 ROUNDS = 8  # largest number of rounds of proof and tightening
 SHORTER = 4  # number of ramp times tried, each half of the one before, until a motion with them exists
@@ -111,11 +114,12 @@ def least_time_motions(
     settings: Sequence[SectionSettings],
     guesses: Sequence[PathAccelerations | None] = (),
 ) -> list[LeastTime]:
-    """Find the fastest motions along sections."""
+    """Find the fastest motions along sections; of limits of winches they keep those of speeds."""
+    problem, bounding, given = search_problem(problem), bounding_problem(problem), problem
     paths = discretes(problem, sections, settings)
     guesses = guesses or [None] * len(sections)
     cases = zip(paths, jumping_motions(paths, guesses), settings, strict=True)
-    answers = together(problem, [_proved(problem, *case) for case in cases])
+    answers = together(problem, [_proved(problem, bounding, *case) for case in cases])
     for finer in FINER:
         # A finer grid may give a motion, or its proof, where this one does not.
         unmet = [k for k, (_, is_met) in enumerate(answers) if not is_met]
@@ -124,13 +128,27 @@ def least_time_motions(
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in unmet]
         paths = discretes(problem, [sections[k] for k in unmet], closer)
         cases = zip(paths, jumping_motions(paths, [guesses[k] for k in unmet]), closer, strict=True)
-        for k, answer in zip(unmet, together(problem, [_proved(problem, *case) for case in cases]), strict=True):
+        for k, answer in zip(
+            unmet, together(problem, [_proved(problem, bounding, *case) for case in cases]), strict=True
+        ):
             answers[k] = answer
-    return [answer for answer, _ in answers]
+    return [_with_motors(given.limits, problem.limits, answer) for answer, _ in answers]
+
+
+def _with_motors(limits: Limits, searched: Limits, answer: LeastTime) -> LeastTime:
+    # Name motors where their speeds are the limits that cables bind at.
+    if limits.motor_speed_max is None:
+        return answer
+    of_motors, cable, motor = are_of_motors(limits, searched), Verdict.CABLE_TOO_FAST, Verdict.MOTOR_TOO_FAST
+    names = (
+        name._replace(criterion=motor.text) if name.criterion == cable.text and of_motors[name.cable] else name
+        for name in answer.names
+    )
+    return dataclasses.replace(answer, names=tuple(names))
 
 
 def _proved(
-    problem: Problem, path: Discrete, start: Jumping, settings: SectionSettings
+    problem: Problem, bounding: Problem, path: Discrete, start: Jumping, settings: SectionSettings
 ) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere; return whether it does. The generator
     # yields motions, and receives the bounds of their slacks.
@@ -139,7 +157,7 @@ def _proved(
         return _without_motion(problem, path, first), False
     section = path.section
     fastest_time = float(cell_times(jumping, path.grid.width).sum())
-    bound = _bound(problem, path, settings, jumping.x, fastest_time)
+    bound = _bound(bounding, path, settings, jumping.x, fastest_time)
     run, jerk = _ramped(path, jumping, settings.ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
     slower: PathSpeeds | None = run
