@@ -179,7 +179,7 @@ def _is_better(plan: PlannedMotions, answers: Answers, faster: Sequence[_Faster]
     return better
 
 
-def _groups(faster: list[_Faster], count: int) -> np.ndarray:
+def _groups(faster: Sequence[_Faster], count: int) -> np.ndarray:
     # Number the groups of segments between two poses at rest, (n,).
     group = np.arange(count)
     for segments in (one.ride.segments for one in faster):
@@ -191,21 +191,21 @@ def _keeping_means(
     plan: PlannedMotions, trial: Sequence[Motion], motions: Sequence[Motion], is_better: np.ndarray, group: np.ndarray
 ) -> np.ndarray:
     # Take back the groups with the largest mean torques, one by one, until the full plan keeps their limit.
-    limit, kept = plan.problem.limits.motor_torque_rms_max, is_better.copy()
+    limit, retimed_rows = plan.problem.limits.motor_torque_rms_max, is_better.copy()
     if limit is None:
         return is_better
     from cspr_jax.verification.mean_torques import mean_torques  # few plans need it
 
     largest = np.asarray(limit)
     while True:
-        chosen = [new if better else old for new, old, better in zip(trial, motions, kept, strict=True)]
+        chosen = [new if better else old for new, old, better in zip(trial, motions, retimed_rows, strict=True)]
         means = mean_torques(plan.problem, chosen)
         if (means.rms_high <= largest * (1.0 + TOUCHED)).all():
-            return kept
-        if not kept.any():  # nor does the plan as it was
+            return retimed_rows
+        if not retimed_rows.any():  # nor does the plan as it was
             return is_better
-        worst = np.where(kept, (means.rms_of_each / largest).max(1), -1.0).argmax()
-        kept &= group != group[worst]
+        worst = np.where(retimed_rows, (means.rms_of_each / largest).max(1), -1.0).argmax()
+        retimed_rows &= group != group[worst]
 
 
 def _with_planned(

@@ -154,8 +154,8 @@ class Verifier(NamedTuple):
 
 def of_family(problem: Problem, *, motor_speeds: bool = False) -> Problem:
     """A problem without what families ignore, so that robots with and without winches share compiled functions."""
-    limits, kept = without_motors(problem.limits), problem.limits.motor_speed_max
-    if not motor_speeds or kept is None:
+    limits, speeds_max = without_motors(problem.limits), problem.limits.motor_speed_max
+    if not motor_speeds or speeds_max is None:
         return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None, winches=None), limits=limits)
-    limits = dataclasses.replace(limits, motor_speed_max=kept)
+    limits = dataclasses.replace(limits, motor_speed_max=speeds_max)
     return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None), limits=limits)

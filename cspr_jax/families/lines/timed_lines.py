@@ -86,8 +86,8 @@ def _names(problem: Problem) -> tuple[str, ...]:
     if limits.motor_speed_max is None:
         return names
     of_motors = are_of_motors(limits, searched)
-    both = (of_motors.any(), "motor_speed_max"), (not of_motors.all(), "cable_speed_max")
-    shown = " or ".join(name for is_met, name in both if is_met)
+    sources = (of_motors.any(), "motor_speed_max"), (not of_motors.all(), "cable_speed_max")
+    shown = " or ".join(name for is_met, name in sources if is_met)
     return tuple(shown if name == "cable_speed_max" else name for name in names)
 
 

@@ -115,7 +115,7 @@ def least_time_motions(
     guesses: Sequence[PathAccelerations | None] = (),
 ) -> list[LeastTime]:
     """Find the fastest motions along sections; of limits of winches they keep those of speeds."""
-    problem, bounding, given = search_problem(problem), bounding_problem(problem), problem
+    problem, bounding, original = search_problem(problem), bounding_problem(problem), problem
     paths = discretes(problem, sections, settings)
     guesses = guesses or [None] * len(sections)
     cases = zip(paths, jumping_motions(paths, guesses), settings, strict=True)
@@ -132,7 +132,7 @@ def least_time_motions(
             unmet, together(problem, [_proved(problem, bounding, *case) for case in cases]), strict=True
         ):
             answers[k] = answer
-    return [_with_motors(given.limits, problem.limits, answer) for answer, _ in answers]
+    return [_with_motors(original.limits, problem.limits, answer) for answer, _ in answers]
 
 
 def _with_motors(limits: Limits, searched: Limits, answer: LeastTime) -> LeastTime:
