@@ -36,7 +36,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.store.files.disk import Disk
-from cspr_jax.store.files.publishing import publish
+from cspr_jax.store.files.publishing import check_writable, publish
 
 NAME = Path("calibrate")
 # Groups of numbers that are estimated if none are named, where the robot has them.
@@ -151,6 +151,7 @@ def check_output(path: Path, *, replace: bool) -> Path:
         raise ConfigError("-o", f"{path}: must end in .toml")
     if path.exists() and not replace:
         raise RefusedError(f"{path}: is there already: choose another name, or say --replace")
+    check_writable(path)
     return path
 
 

@@ -5,8 +5,10 @@ from pathlib import Path
 
 from cspr_jax.cli.command import (
     Command,
+    add_device,
     add_json,
     add_output,
+    numbers_of,
     prepare_jax,
     print_json,
     print_line,
@@ -69,26 +71,14 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "write the calibrated robot, FILE.toml", metavar="FILE")
     parser.add_argument("--replace", action="store_true", help="let -o replace a file that is there")
     add_json(parser)
-
-
-def _sigma(text: str | None) -> list[float] | None:
-    if text is None:
-        return None
-    try:
-        values = [float(word) for word in text.split(",")]
-    except ValueError:
-        values = []
-    if not 1 <= len(values) <= 3 or not all(0.0 < value < 1e9 for value in values):
-        raise ConfigError("--sigma", f"{text}: must be one to three numbers > 0, as in 1e-4,2e-4,1e-3")
-    return values
+    add_device(parser)
 
 
 def _calibrate(options: argparse.Namespace) -> int:
     if not 0 <= options.next <= 1000:
         raise ConfigError("--next", f"{options.next}: must be an integer from 0 to 1000")
-    sigma = _sigma(options.sigma)
+    sigma = None if options.sigma is None else numbers_of("--sigma", options.sigma, (1, 2, 3), is_positive=True)
     with waiting():
-        options.device = None
         prepare_jax(options, quick=True)
         from cspr_jax.api import calibration
         from cspr_jax.api.arguments.calibration_arguments import limits_file

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -47,6 +48,20 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
     """Add the option that names the file or folder to write."""
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
+
+
+def numbers_of(option: str, text: str, counts: tuple[int, ...] = (), *, is_positive: bool = False) -> list[float]:
+    """Finite numbers of an option, separated by commas; any number of them without `counts`."""
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        values = [math.nan]
+    is_allowed = all(math.isfinite(value) and (value > 0.0 or not is_positive) for value in values)
+    if not is_allowed or (counts and len(values) not in counts):
+        many = f"{' or '.join(map(str, counts))} " if counts else ""
+        above = " > 0" if is_positive else ""
+        raise ConfigError(option, f"{text}: must be {many}finite numbers{above}, separated by commas")
+    return values
 
 
 def checked_picture(options: argparse.Namespace) -> dict[str, Any]:

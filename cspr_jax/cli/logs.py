@@ -1,7 +1,6 @@
 """Commands for measured cable lengths: locate, log."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    numbers_of,
     prepare_jax,
     print_json,
     print_line,
@@ -39,19 +39,6 @@ def _add_locate(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     add_output(parser, "write the poses to FILE.csv", metavar="FILE")
     add_device(parser)
-
-
-def numbers_of(option: str, text: str, counts: tuple[int, ...] = ()) -> list[float]:
-    """Numbers of an option, separated by commas."""
-    words = [word.strip() for word in text.split(",")]
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        values = [float("nan")]
-    if not all(map(math.isfinite, values)) or (counts and len(values) not in counts):
-        many = f"{' or '.join(map(str, counts))} " if counts else ""
-        raise ConfigError(option, f"{text}: must be {many}finite numbers, separated by commas")
-    return values
 
 
 def _locate(options: argparse.Namespace) -> int:

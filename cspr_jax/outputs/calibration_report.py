@@ -12,6 +12,7 @@ from cspr_jax import __version__
 from cspr_jax.config.formats.writing import robot_text, value_text
 from cspr_jax.machine.calibration.calibrated import PROBABILITY, Calibrated
 from cspr_jax.machine.calibration.directions import correlations
+from cspr_jax.machine.calibration.elimination import UNSEEN
 from cspr_jax.machine.calibration.measurements import joined_names
 from cspr_jax.machine.calibration.next_poses import NextPoses
 from cspr_jax.machine.calibration.parameters import Parameter
@@ -40,7 +41,7 @@ def file_points(robot: AnyRobot) -> np.ndarray:
 def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]]:
     """All parameters of the robot: nominal and calibrated values, standard deviations."""
     deviations, units = np.sqrt(np.diagonal(result.covariance)), result.parameters.units
-    unseen = np.abs(result.estimate.measured.null_space).max(axis=0, initial=0.0) > 1e-5
+    is_unseen = result.estimate.measured.unseen_parts > UNSEEN
     rows = []
     for i, row in enumerate(result.parameters.rows):
         if row.group == "tracker":
@@ -54,7 +55,7 @@ def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]
             "unit": row.unit,
         }
         fields |= {"nominal": before, "value": before + change, "change": change}
-        fields |= {"standard_deviation": float(deviations[i]) * row.per_metre, "seen": not bool(unseen[i])}
+        fields |= {"standard_deviation": float(deviations[i]) * row.per_metre, "seen": not bool(is_unseen[i])}
         rows.append(fields)
     return rows
 

@@ -67,6 +67,12 @@ def test_a_table_becomes_a_robot_file(folder):
     assert (code, err) == (0, "") and "left out: line 10, length_3" in out and "spool 3 z" in out
 
 
+def test_a_folder_that_is_not_there_is_seen_before_anything_is_read(folder):
+    code, out, err = cspr("calibrate", "none.csv", "--robot", "none.toml", "--device", "cpu", "-o", "no/b.toml")
+    assert (code, out) == (4, "") and "no/b.toml" in err and "none" not in err and len(err.splitlines()) == 1, err
+    assert not list(folder.glob("no*"))
+
+
 def test_angles_set_the_zero_of_the_winches(folder):
     spools, offsets, readings, seen, _ = prism_case(4, 0.0)
     angles = 5.0 * np.array([1.0, -1.0, 1.0]) * (readings - 1.0) / 0.05
@@ -109,7 +115,8 @@ def test_wrong_tables_are_refused_in_one_line(folder, text, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--sigma", "a"], "--sigma: a: must be one to three numbers > 0"),
+        (["--sigma", "a"], "--sigma: a: must be 1 or 2 or 3 finite numbers > 0, separated by commas"),
+        (["--sigma", "1e-4,0"], "--sigma: 1e-4,0: must be 1 or 2 or 3 finite numbers > 0"),
         (["--next", "-3"], "--next: -3: must be an integer from 0 to 1000"),
         (["-o", "n.json"], "-o: n.json: must end in .toml"),
         (["--free", "spools,drum"], 'free = "drum": did you mean drums?'),

@@ -9,7 +9,7 @@ from support.prism import prism, prism_case
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.machine.calibration.elimination import toward_nominal
+from cspr_jax.machine.calibration.elimination import UNSEEN, toward_nominal
 
 TURN, SHIFT = Rotation.from_rotvec([0.4, -1.0, 2.0]), np.array([3.0, -5.0, 1.0])
 FREE = ["spools", "offsets", "tracker"]
@@ -58,6 +58,19 @@ def test_steps_toward_the_nominal_robot():
     # With nothing but the tracker's own directions nothing moves, whatever rounding leaves of them in the machine.
     rounded = alone + 1e-17 * rng.normal(size=8)
     np.testing.assert_allclose(toward_nominal(rounded[None], is_of_machine) @ change, 0.0, atol=1e-9)
+
+
+def test_what_is_unseen_does_not_depend_on_the_basis():
+    """Parts of parameters in the null space, for its basis and a rotated one: each vector alone has less."""
+    _, _, readings, seen, _ = prism_case(13, 1e-4, 20)
+    readings[:, 2] = np.nan
+    problem = cspr_jax.calibrate(prism(), readings, seen, loss="squares")._result.estimate.measured
+    assert np.flatnonzero(problem.unseen_parts > UNSEEN).tolist() == [6, 7, 8, 11]
+    np.testing.assert_allclose(problem.unseen_parts[[6, 7, 8, 11]], 1.0, atol=1e-12)
+    basis = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 4)))[0]
+    vectors = problem.vectors.copy()
+    vectors[~problem.is_seen] = basis @ problem.null_space
+    np.testing.assert_allclose(problem._replace(vectors=vectors).unseen_parts, problem.unseen_parts, atol=1e-12)
 
 
 def test_next_poses_beside_a_tracker_know_spools_no_worse():

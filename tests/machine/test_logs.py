@@ -13,6 +13,7 @@ from cspr_jax.config.cable_logs import read_cable_log
 from cspr_jax.errors import ConfigError
 from cspr_jax.machine.logs import delay, disagreement
 from cspr_jax.outputs.logs import log_report
+from cspr_jax.outputs.plots.pages.logs import log_content
 
 PLACES = [([0.0, 0.0, 1.2], 0.0), ([0.1, 0.05, 1.1], 1.5), ([0.0, 0.1, 1.3], 3.0)]
 WIDE = [([0.0, 0.0, 2.0], 0.0), ([1.0, 0.5, 2.2], 3.0), ([0.0, -0.6, 1.8], 6.0)]
@@ -125,6 +126,7 @@ def test_the_cable_that_disagrees(tmp_path):
     lengths[:, 2] += 0.003
     is_slack = (times > 1.0) & (times < 1.4)
     tensions[is_slack, 5] = 0.0
+    lengths[is_slack, 5] += 0.02  # a slack cable says nothing of the others
     found = cspr_jax.compare_log(_written(tmp_path / "log.csv", times, lengths, tensions), spec, tolerance=0.02)
     assert abs(found.delay.value - 0.05) < 5e-4 and found.within_tolerance
     table = found.to_dict()
@@ -171,6 +173,10 @@ def test_a_log_of_one_cable_and_one_without_poses():
     assert table["disagreeing_cable"] is None and table["delay"] is None and not log.within_tolerance
     assert table["position_error"] == {"rms": pytest.approx(0.00216024689947), "largest": 0.003, "t": 2.0}
     assert "cable 1" not in table["disagreement"] and "cannot be told" in log_report.log_lines(log)[1]
+    page = log_content(log_report.ComparedLog(**one | {"tensions": np.ones((4, 1)), "slack": [[(1.0, 2.0)]]}))
+    assert [chart["axis"] for chart in page["charts"]] == ["position error (mm)", "length error (mm)", "tension (N)"]
+    assert page["charts"][2]["intervals"] == [{"words": "cable 1 slack", "start": 1.0, "end": 2.0}]
+    assert page["charts"][2]["unit"] == "N" and page["charts"][0]["levels"] == [{"words": "tolerance", "value": 10.0}]
     nothing = np.full(4, np.nan)
     lost = log_report.ComparedLog(**one | {"position_errors": nothing, "angle_errors": nothing})
     table = json.loads(json.dumps(log_report.log_object(lost), allow_nan=False))

@@ -183,8 +183,8 @@ def _compared(
     cosine = np.minimum(np.abs((orientations * quaternions).sum(1)), 1.0)
     angle = 2.0 * np.arccos(cosine) if search.row.is_body else None
     picked = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(int))
-    disagreement, longer = _disagreement(search, poses, picked)
-    tension, slack = _slack(read, curves, planned.robot_file.pairs, times, shift)
+    tension, is_slack = _slack(read, curves, planned.robot_file.pairs, times - shift)
+    disagreement, longer = _disagreement(search, poses, picked, ~is_slack[rows[picked]].any(1))
     lengthened: list[list[tuple[float, float]]] = [[] for _ in range(robot.n_cables)]
     if longer is not None:
         lengthened = [intervals(times[rows[picked]], longer[:, k]) for k in range(robot.n_cables)]
@@ -204,7 +204,7 @@ def _compared(
         n_spare=robot.n_cables - robot.dof,
         tensions=tension,
         planned_tensions=curves.tensions(times - shift),
-        slack=slack,
+        slack=None if tension is None else [intervals(times, row) for row in is_slack.T],
         lengthened=lengthened,
         tolerance=tolerance,
         warnings=tuple(warnings),
@@ -224,16 +224,17 @@ def _positive(path: Path, read: CableLog, lengths: np.ndarray, warnings: list[st
     return lengths
 
 
-def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, np.ndarray | None]:
+def _disagreement(search: Search, poses: Any, picked: np.ndarray, is_taut: np.ndarray) -> tuple[Any, np.ndarray | None]:
+    # Disagreement over rows with taut cables, if there are any, and rows in which one cable alone is longer.
     robot = search.robot
     if robot.n_cables == robot.dof:
         return None, None
     cases = poses.positions[picked, 0], poses.quaternions[picked, 0]
     matrices = in_batches(lambda x: geometry.wrench_matrices(robot, *x), cases, batch_size=BATCH)
     matrices = matrices / np.where(geometry.scales(robot), search.radius, 1.0)[:, None]
-    measured = -poses.residuals[picked, 0]
-    null = null_vectors(matrices)
-    disagreement = disagreement_of(null, measured)
+    null, measured = null_vectors(matrices), -poses.residuals[picked, 0]
+    counted = is_taut if is_taut.any() else ~is_taut
+    disagreement = disagreement_of(null[counted], measured[counted])
     if robot.n_cables < robot.dof + 2:
         return disagreement, None
     constant = np.zeros(robot.n_cables)
@@ -244,18 +245,13 @@ def _disagreement(search: Search, poses: Any, picked: np.ndarray) -> tuple[Any, 
     return disagreement, longer_rows(null, rest, threshold)
 
 
-def _slack(
-    read: CableLog, curves: PlanCurves, pairs: Any, times: np.ndarray, shift: float
-) -> tuple[np.ndarray | None, list[list[tuple[float, float]]] | None]:
-    # Measured tensions, of pairs their sums, and intervals in which a cable, or one of a pair, is slack.
-    tensions, planned = read.tensions, curves.tensions(times - shift)
+def _slack(read: CableLog, curves: PlanCurves, pairs: Any, times: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+    # Measured tensions, of pairs their sums, and whether each cable, or one of a pair, is slack by them.
+    tensions, planned = read.tensions, curves.tensions(times)
     if tensions is None:
-        return None, None
+        return None, np.zeros(planned.shape, bool)
+    each, planned = tensions[:, :, None], planned[:, :, None]
     if pairs is not None and tensions.shape[1] == 2 * planned.shape[1]:
-        each, planned = tensions[:, pairs.cables], curves.tensions_each(times - shift)[:, pairs.cables]
-        tensions = each.sum(2)
-    else:
-        each, planned = tensions[:, :, None], planned[:, :, None]
+        each, planned = tensions[:, pairs.cables], curves.tensions_each(times)[:, pairs.cables]
     with np.errstate(invalid="ignore"):
-        is_slack = np.any(each <= SLACK * planned, axis=2)
-    return tensions, [intervals(times, is_slack[:, k]) for k in range(tensions.shape[1])]
+        return each.sum(2), np.any(each <= SLACK * planned, axis=2)

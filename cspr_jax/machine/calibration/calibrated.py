@@ -10,6 +10,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.machine.calibration.directions import Direction, terms, unseen_directions
+from cspr_jax.machine.calibration.elimination import UNSEEN
 from cspr_jax.machine.calibration.least_squares import Adjustment, Estimate, Loss, estimated
 from cspr_jax.machine.calibration.measurements import Measurements
 from cspr_jax.machine.calibration.next_poses import CANDIDATES, NextPoses, candidates, next_poses
@@ -29,8 +30,6 @@ from cspr_jax.robots.model.point_mass import spool_radius
 
 # Probability with which all spools are within the uncertainty.
 PROBABILITY = 0.95
-# Part of a direction that moves spools beside the motions of all of them as one body.
-INSIDE = 1e-5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,8 +103,8 @@ class Calibrated:
         bodies += [np.cross(axis, base) for axis in np.eye(3)]
         columns = np.stack([body.ravel() for body in bodies], axis=1)
         flat = moves.reshape(base.size, len(null_space))
-        left = flat - columns @ np.linalg.lstsq(columns, flat, rcond=INSIDE**2)[0]
-        return np.abs(left.reshape(moves.shape)).max(axis=(1, 2), initial=0.0) > INSIDE
+        left = flat - columns @ np.linalg.lstsq(columns, flat, rcond=UNSEEN**2)[0]
+        return np.linalg.norm(left.reshape(moves.shape), axis=(1, 2)) > UNSEEN
 
     def weakest(self) -> tuple[float, str]:
         """Standard deviation along the direction that is seen worst, m, and the direction in words."""

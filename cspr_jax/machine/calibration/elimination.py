@@ -15,6 +15,9 @@ from cspr_jax.numerics.shapes import Bool, Float
 # Singular values up to this fraction of the largest one are those of directions that cannot be seen. Rounding leaves
 # some 1e-14; a direction at the bound would be known ten million times worse than the best one.
 RANK = 1e-7
+# Part of a unit vector in the null space above which it is unseen. Null vectors have errors of some 1e-16 / RANK; a
+# part at the bound leaves ten micrometres open where a metre is.
+UNSEEN = 1e-5
 # Directions that cannot be seen of which less than this part moves the machine move the tracker alone.
 TRACKER_ALONE = 1e-6
 
@@ -48,6 +51,11 @@ class Reduced(NamedTuple):
     def null_space(self) -> Float[np.ndarray, "q p"]:
         """Directions that cannot be seen, one a row."""
         return self.vectors[~self.is_seen]
+
+    @property
+    def unseen_parts(self) -> Float[np.ndarray, "p"]:
+        """Part of each parameter that lies in the null space, 0 to 1, whatever basis this has."""
+        return np.linalg.norm(self.null_space, axis=0)
 
     @property
     def covariance(self) -> Float[np.ndarray, "p p"]:

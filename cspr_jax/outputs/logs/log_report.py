@@ -33,7 +33,8 @@ class ComparedLog:
         angle_errors: (k,) rotations from the planned orientations, rad; None for a point mass.
         is_found: (k,) whether measured lengths have a pose.
         residuals: (k, m) lengths of the cables in the pose minus measured ones, m.
-        disagreement: cables that do not agree with the others; None with as many cables as degrees of freedom.
+        disagreement: cables that do not agree with the others, over rows in which none is slack by its tension; None
+            with as many cables as degrees of freedom.
         n_spare: number of cables beyond degrees of freedom.
         tensions: (n, m) measured tensions, N, or None.
         planned_tensions: (n, m) N.
