@@ -42,16 +42,18 @@ class AnyCableGone(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile: the smallest margins, and the cable whose loss is the worst."""
-        each = [one(cells) for one in self._maps]
+        each = [one.with_orientations(cells) for one in self._maps]
+        inside = np.logical_and.reduce([answers.pop("inside") for answers in each])
         columns = {name: np.stack([answers[name] for answers in each]) for name in each[0]}
         count = columns["verdict"].shape[1]
         answers = {name: np.fmin.reduce(columns[name]) for name in MARGINS}
         # NaN where a cable is slack without one.
         answers[FREQUENCY] = np.minimum.reduce(columns[FREQUENCY])
-        answers["orientation_fraction"] = columns["orientation_fraction"].min(0)
+        # An orientation is inside if it is so whichever cable is gone.
+        answers["orientation_fraction"] = self._maps[0].fraction(inside)
         answers["verdict"] = conjunction(np.bitwise_or.reduce(columns["verdict"]))
-        margins = next((columns[name] for name in MARGINS if not np.isnan(columns[name]).all()), None)
-        worst = np.zeros(count, int) if margins is None else np.where(np.isnan(margins), np.inf, margins).argmin(0)
+        margins = columns[self._maps[0].first_margin]
+        worst = np.where(np.isnan(margins), np.inf, margins).argmin(0)
         answers["worst_cable"] = (worst + 1).astype(np.int16)
         nearest = np.where(np.isnan(columns["clearance"]), np.inf, columns["clearance"]).argmin(0)
         answers["nearest_bodies"] = columns["nearest_bodies"][nearest, np.arange(count)]

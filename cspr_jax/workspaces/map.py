@@ -1,5 +1,7 @@
 """Maps of workspaces: whether a robot of any pattern on any number of cables can hold each pose."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from functools import partial
@@ -18,6 +20,7 @@ from cspr_jax.motion.given_limits import static_limits
 from cspr_jax.motion.limits import are_of_motors, search_limits
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.limits import Limits
@@ -189,6 +192,21 @@ class WorkspaceMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
+        answers = self.with_orientations(cells)
+        del answers["inside"]
+        return answers
+
+    @property
+    def first_margin(self) -> str:
+        """The margin that tells which cable's loss is the worst."""
+        return self._poses.first_margin
+
+    def fraction(self, inside: Bool[np.ndarray, "n k"]) -> Float[np.ndarray, "n"]:
+        """Part of the set of orientations, by volume, that is inside at each position."""
+        return inside @ self._volume
+
+    def with_orientations(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers, and in "inside" (n, k) which orientations of the set, or the one orientation, each cell has."""
         if self._samples is not None:
             positions = self._targets(cells)
             kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
@@ -201,8 +219,9 @@ class WorkspaceMap(GridMap):
             answers["verdict"] = self._cells.verdicts(positions, answers["verdict"])
             if self._workspace.prove:
                 sides, reasons = self._cells(positions, self._half_sizes(cells))
-        fraction = (answers["verdict"] == 0).astype(float)
-        return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
+        inside = answers["verdict"] == 0
+        answers |= {"inside": inside[:, None], "orientation_fraction": inside.astype(float)}
+        return answers | {"cell_side": sides, "cell_open": reasons}
 
     def _poses_of(self, cells: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         # Positions and quaternions of the cells of a map of poses.

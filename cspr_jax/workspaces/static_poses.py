@@ -65,6 +65,13 @@ class RestPoses:
     of_mass_centre: bool = False
     elastic: bool = False
 
+    @property
+    def first_margin(self) -> str:
+        """The first of `MARGINS` that is requested; every map of a workspace has one of these."""
+        capacity = () if self.capacity is None else ("capacity_margin",)
+        names = {margin_name(condition) for condition in self.searches} | {*capacity, "clearance"}
+        return next(name for name in MARGINS if name in names)
+
     def origins(
         self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Float[np.ndarray, "n 3"]:
@@ -82,7 +89,7 @@ class RestPoses:
         for condition, search in self.searches.items():
             answers = search(centres, quaternions)
             verdict |= answers.verdict
-            name = "closure_margin" if condition == CLOSURE else "wrench_margin"
+            name = margin_name(condition)
             columns[name] = np.fmin(columns[name], answers.margin)
         if self.capacity is not None:
             columns["capacity_margin"] = self.capacity(centres, quaternions).margin
@@ -137,6 +144,11 @@ class RestPoses:
             yield "speed_margin", self.speeds.flags, slack, TOUCHED * self.speeds.maximum
 
 
+def margin_name(condition: str) -> str:
+    """Name of the margin of a condition on the cables."""
+    return "closure_margin" if condition == CLOSURE else "wrench_margin"
+
+
 def over_orientations(
     ask: Callable[[np.ndarray, np.ndarray], PoseColumns],
     origins: Float[np.ndarray, "n 3"],
@@ -144,7 +156,10 @@ def over_orientations(
     volume: Float[np.ndarray, "k"],
     kind: OrientationSet,
 ) -> PoseColumns:
-    """Tell whether positions belong to the workspace of a set of orientations."""
+    """Tell whether positions belong to the workspace of a set of orientations.
+
+    The column "inside" (n, k) tells which orientations of the set each position has.
+    """
     parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
     for start in range(0, len(origins), step):
@@ -172,7 +187,8 @@ def _over_positions(columns: PoseColumns, volume: np.ndarray, kind: OrientationS
     best_values = {name: best(columns[name], axis=1) for name in (*MARGINS, FREQUENCY) if name in columns}
     at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)
     best_values[NEAREST] = columns[NEAREST][np.arange(len(at)), at]
-    return {"verdict": reasons.astype(FLAGS), **best_values, "orientation_fraction": inside @ volume}
+    values = {"verdict": reasons.astype(FLAGS), **best_values, "inside": inside}
+    return values | {"orientation_fraction": inside @ volume}
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:

@@ -11,6 +11,8 @@ import cspr_jax
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError
+from cspr_jax.workspaces.any_cable_gone import AnyCableGone
+from cspr_jax.workspaces.static_poses import FREQUENCY, MARGINS
 
 SPOOLS = [[1.2, 0.0, 0.0], [0.4, 1.1, 0.05], [-1.0, 0.7, 0.0], [-0.9, -0.7, 0.0], [0.3, -1.2, 0.1]]
 EACH = {
@@ -161,3 +163,69 @@ def test_a_planar_robot_keeps_level_spools():
     assert without_cables(whole, [2], "f").base_points == whole.base_points[:2]
     with pytest.raises(ConfigError, match=r"^f: without = \[0\]: base_points = .*level"):
         without_cables(whole, [0], "f")
+
+
+PLANAR = {
+    "name": "planar",
+    "mass": 1.0,
+    "inertia": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+    "pattern": "1R2T",
+    "tension_min": 0.5,
+    "tension_max": 60.0,
+    "base_points": [
+        [x, 0.0, z] for x, z in ((-1.0, 0.0), (1.0, 0.0), (-1.2, 0.1), (1.2, 0.1), (-0.7, 0.0), (0.7, 0.0))
+    ],
+    "platform_points": [[x, 0.0, z] for z in (0.1, -0.1, 0.0) for x in (-0.1, 0.1)],
+}
+
+
+class _Rows:
+    """A map of two cells, of robots without tensions in the first one."""
+
+    first_margin = "wrench_margin"
+
+    def __init__(self, wrench, clearance):
+        self._columns = {name: np.full(2, np.nan) for name in (*MARGINS, FREQUENCY)}
+        self._columns |= {"wrench_margin": np.array(wrench), "clearance": np.array(clearance)}
+
+    def with_orientations(self, cells):
+        zeros, chosen = np.zeros(2, np.int16), cells["x"]
+        columns = self._columns | dict.fromkeys(("verdict", "nearest_bodies", "cell_side", "cell_open"), zeros)
+        columns |= {"inside": np.ones((2, 1), bool), "orientation_fraction": np.ones(2)}
+        return {name: values[chosen] for name, values in columns.items()}
+
+    def fraction(self, inside):
+        return inside.mean(1)
+
+
+def test_the_worst_cable_does_not_depend_on_tiles():
+    """Cells one by one, and together: where no margin of the tensions is known, the clearance does not stand in."""
+    whole = object.__new__(AnyCableGone)
+    whole._maps = [_Rows([np.nan, 2.0], [3.0, 3.0]), _Rows([np.nan, 1.0], [1.0, 4.0])]
+    each = [whole({"x": np.array([i])})["worst_cable"][0] for i in range(2)]
+    assert each == whole({"x": np.arange(2)})["worst_cable"].tolist() == [1, 2]
+
+
+@pytest.mark.thorough
+def test_fractions_of_any_cable_gone_are_of_orientations_in_common():
+    """Orientations one by one: those that every robot without a cable has, not the smallest fraction of a robot."""
+    angles = np.linspace(-0.6, 0.6, 7)
+    turns = [[float(np.cos(0.5 * a)), 0.0, float(np.sin(0.5 * a)), 0.0] for a in angles]
+    axes = {"x": [-0.4, 0.0, 0.3], "y": [0.0], "z": [0.6, 1.0, 1.4]}
+    workspace = {"conditions": ["wrench-feasible"], "orientations": "inclusion", "quaternions": turns}
+    sweep = SWEEP | {"robot": PLANAR, "axes": axes, "workspace": workspace}
+
+    def fractions(**more):
+        return cspr_jax.compute_sweep(sweep | more)["orientation_fraction"].values.ravel()
+
+    inside = np.ones((9, len(turns)), bool)
+    for k in range(6):
+        left = {name: [x for i, x in enumerate(PLANAR[name]) if i != k] for name in ("base_points", "platform_points")}
+        for i, turn in enumerate(turns):
+            one = {"conditions": ["wrench-feasible"], "orientation": turn}
+            cells = cspr_jax.compute_sweep(sweep | {"robot": PLANAR | left, "workspace": one})
+            inside[:, i] &= cells["verdict"].values.ravel() == 0
+    common = fractions(without="any-one")
+    np.testing.assert_allclose(common, inside.mean(1), atol=1e-12)
+    smallest = np.min([fractions(without=[k]) for k in range(6)], axis=0)
+    assert (common <= smallest + 1e-12).all() and (common < smallest - 0.05).any() and (common > 0.0).any()
