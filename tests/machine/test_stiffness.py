@@ -11,6 +11,7 @@ from support.cable_robots import any_robot
 
 import cspr_jax
 from cspr_jax.errors import InputError
+from cspr_jax.robots.model.limits import Limits
 
 G = 9.81
 AREA = 2e4  # N, EA
@@ -255,3 +256,24 @@ def test_mistakes(robot, more, line):
         with pytest.raises(InputError, match=line) as error:
             function(robot, [[0.0, 0.0, 1.0]], **more)
         assert "\n" not in str(error.value)
+
+
+def test_tensions_of_redundant_cables_are_within_limits_of_motors():
+    """At rest those of torque are limits of tension, in the worse direction of friction."""
+    spools = [[1.2, 0.0, 0.0], [0.4, 1.1, 0.05], [-1.0, 0.7, 0.0], [-0.9, -0.7, 0.0], [0.3, -1.2, 0.1]]
+    drum = {"drum_radius": 0.02, "gear_ratio": 2.0, "efficiency": 0.9, "friction": 0.005}
+    largest = np.array([4.0, 5.0, 6.0, 4.0, 6.0])
+    plain, limited = (
+        cspr_jax.point_mass(spools, mass=1.0, limits=Limits(tension_min=np.full(5, 0.5), tension_max=high))
+        for high in (np.full(5, 30.0), largest)
+    )
+    torque = largest * drum["drum_radius"] / (drum["gear_ratio"] * drum["efficiency"]) + drum["friction"]
+    of_motors, of_tensions, free = (
+        cspr_jax.natural_frequencies(
+            cspr_jax.with_cables(robot, axial_stiffness=1e4, winch=drum | more), [[0.1, 0.0, 1.5], [0.0, -0.2, 1.2]]
+        )
+        for robot, more in ((plain, {"motor_torque_max": torque}), (limited, {}), (plain, {}))
+    )
+    np.testing.assert_allclose(of_motors.tensions, of_tensions.tensions, rtol=1e-9)
+    np.testing.assert_allclose(of_motors.frequencies, of_tensions.frequencies, rtol=1e-9)
+    assert (of_motors.tensions < largest).all() and not np.allclose(free.tensions, of_motors.tensions, rtol=0.01)

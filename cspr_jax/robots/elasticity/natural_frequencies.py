@@ -62,15 +62,21 @@ def rest_poses(
     rule: str = CENTRED,
 ) -> tuple[State, Float[np.ndarray, "n n_cables"]]:
     """States at rest, and the tensions that hold them; NaN where none do."""
-    kernel = partial(_at_rest, robot, Limits(*tension_range(robot, limits)), rule=rule)
+    kernel = partial(_at_rest, robot, _of_tensions(robot, limits), rule=rule)
     answer: tuple[State, np.ndarray] = in_batches(kernel, (centres, quaternions), batch_size=BATCH)
     return answer
 
 
 def tensions_in(robot: AnyRobot, states: State, limits: Limits, rule: str = CENTRED) -> Float[np.ndarray, "n n_cables"]:
     """Tensions that move a robot through n states."""
-    kernel = partial(_tensions, robot, Limits(*tension_range(robot, limits)), rule=rule)
+    kernel = partial(_tensions, robot, _of_tensions(robot, limits), rule=rule)
     return in_batches(kernel, states, batch_size=BATCH)
+
+
+def _of_tensions(robot: AnyRobot, limits: Limits) -> Limits:
+    # Limits between which tensions are chosen; without the others, so that compiled functions are shared.
+    motors = cables.BOUNDING if robot.n_cables > robot.dof and robot.winches is not None else ()
+    return Limits(*tension_range(robot, limits), **{name: getattr(limits, name) for name in motors})
 
 
 def stiffnesses(
