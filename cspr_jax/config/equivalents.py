@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.errors import InputError
+from cspr_jax.errors import ConfigError, InputError
 
 PLATFORM = "3R3T"
 
@@ -26,8 +26,11 @@ def as_moved(
         return robot_file
     try:
         return robot_file.equivalent()
-    except InputError:  # the function that refuses the platform adds `no_equivalent`
-        return robot_file
+    except InputError as error:
+        if robot_file.translation_only:
+            source, key = robot_file.placed("translation_only", file)
+            raise ConfigError(source, f"{key} = true: must be absent: {error.problem}") from error
+        return robot_file  # the function that refuses the platform adds `no_equivalent`
 
 
 def no_equivalent(robot_file: RobotFile) -> str:

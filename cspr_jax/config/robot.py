@@ -26,7 +26,7 @@ from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.errors.suggestions import did_you_mean
-from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
+from cspr_jax.robots.model.parallel_pairs import COUNT, ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 
@@ -173,7 +173,7 @@ class RobotFile(LimitKeys):
 
     @model_validator(mode="after")
     def _translates(self) -> "RobotFile":
-        if self.translation_only:
+        if self.translation_only and len(self.base_points) <= COUNT:  # of more cables some must be gone
             try:
                 self.parallel_pairs()
             except InputError as error:
@@ -212,7 +212,8 @@ class RobotFile(LimitKeys):
     @property
     def settings(self) -> dict[str, Any]:
         """Plain values on which motions depend: keys of the file, and translation_only of an equivalent."""
-        return self.full.model_dump(mode="json", exclude_none=True)
+        of_file = self.full.model_dump(mode="json", exclude_none=True)
+        return of_file if self._platform is None else of_file | {"translation_only": True}
 
     def as_remaining(self, full: "RobotFile", remaining: list[int]) -> "RobotFile":
         """This robot as what is left of another one that has lost cables."""

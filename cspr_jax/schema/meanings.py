@@ -13,7 +13,9 @@ from cspr_jax.schema.quantities import Quantity
 def _numbers_of_cables(settings: Mapping[str, Any]) -> list[int]:
     # Numbers from 1 on, as in the file of the robot, of the cables that move it.
     robot, without = settings["robot"], settings.get("without")
-    count = 3 if robot.get("translation_only") else len(robot["base_points"])
+    if robot.get("translation_only"):  # three cables of the equivalent, whichever are gone
+        return [1, 2, 3]
+    count = len(robot["base_points"])
     gone = without if isinstance(without, list) else []
     return [k + 1 for k in range(count) if k not in gone]
 

@@ -8,7 +8,9 @@ import pytest
 from support.commands import cspr, refuse_sweep, strict_json, swept
 
 import cspr_jax
+from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.missing_cables import without_cables
+from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.workspaces.any_cable_gone import AnyCableGone
@@ -229,3 +231,36 @@ def test_fractions_of_any_cable_gone_are_of_orientations_in_common():
     np.testing.assert_allclose(common, inside.mean(1), atol=1e-12)
     smallest = np.min([fractions(without=[k]) for k in range(6)], axis=0)
     assert (common <= smallest + 1e-12).all() and (common < smallest - 0.05).any() and (common > 0.0).any()
+
+
+def _with_two_more(**more):
+    """Six cables in three parallel pairs, and two beside them."""
+    pairs = cspr_jax.parallel_pair_robot(0.5, 0.05, mass=1.0)
+    lists = {name: np.asarray(getattr(pairs, name)).tolist() for name in ("base_points", "platform_points", "inertia")}
+    lists["base_points"] += [[0.3, 0.0, 0.0], [-0.3, 0.1, 0.0]]
+    lists["platform_points"] += [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]]
+    return {"name": "eight", "mass": 1.0} | lists | more
+
+
+def test_settings_of_an_equivalent_say_so(tmp_path):
+    """Of a platform whose six cables that are left are parallel pairs: its plan and its file move a point mass."""
+    robot = RobotFile(**_with_two_more())
+    moved = as_moved(robot, [("3T",)], [6, 7])
+    settings = json.loads(json.dumps(moved.settings))
+    assert settings["translation_only"] is True and len(settings["base_points"]) == 8
+    again = as_moved(checked(RobotFile, settings, "f"), [("3R3T", "3T")], [6, 7])
+    assert again.base_points == moved.base_points and again.settings == settings
+    assert "translation_only" not in as_moved(robot, [("3R3T", "3T")], [6, 7]).settings
+    plan = {"robot": _with_two_more(), "family": "transition", "z0": 1.2, "without": [6, 7]}
+    (tmp_path / "p.toml").write_text(
+        _toml({"schema": 1, **plan, "pose": [{"rest": True}, {"position": [0.1, 0.0, 1.2]}]})
+    )
+    assert cspr("plan", tmp_path / "p.toml", "-o", tmp_path / "m.h5")[0] == 0
+    assert cspr("plot", tmp_path / "m.h5", "--quantity", "tensions", "-o", tmp_path / "t.png")[0] == 0
+
+
+def test_all_cables_of_an_equivalent_are_six():
+    plan = {"schema": 1, "robot": _with_two_more(translation_only=True), "family": "hypocycloid-standard", "z0": 1.2}
+    with pytest.raises(ConfigError, match=r"robot\.translation_only = true: must be absent: ") as error:
+        cspr_jax.plan(plan | {"pose": [{"rest": True}, {"position": [0.1, 0.0, 1.2]}]})
+    assert "\n" not in str(error.value)
