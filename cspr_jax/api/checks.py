@@ -142,6 +142,9 @@ class Check(Displayed):
     def slower(self) -> "Stretched":
         """Find the smallest uniform stretching of time that makes the motion feasible.
 
+        Under limits of torque, power or load of winches, friction and its jump at standstill leave no certainty that a
+        smaller one, or one where none is found, does not exist; what is found is proved.
+
         Returns:
             the factor, and the check of the stretched motion.
         """

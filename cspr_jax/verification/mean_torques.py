@@ -183,8 +183,8 @@ def extended(case: MotionProof, totals: MeanTorques, limit: Float[np.ndarray, "n
 
 
 def proof_with_means(problem: Problem, motion: Any, scene: Scene | None) -> MotionProof:
-    """Proof of one motion that is a full plan."""
+    """Proof of one motion that is a full plan; without means where other criteria are not proved."""
     case, limit = proof_of(problem, motion, scene), problem.limits.motor_torque_rms_max
-    if limit is None or not np.isfinite(float(motion.duration())):
+    if limit is None or not case.is_feasible:
         return case
     return extended(case, mean_torques(problem, [motion]), np.asarray(limit))

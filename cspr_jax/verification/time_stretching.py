@@ -4,7 +4,9 @@ Stretching by c divides velocities by c and accelerations by c^2, so that the wr
 in u = 1 / c^2. Weighted means of feasible tensions for two values of u are feasible for values between them: at every
 time the feasible u form an interval, and so they do for the full motion. The smallest distance of tensions from their
 limits is concave in u, and speeds and accelerations of cables decrease with c: a search along u finds a feasible
-stretching if there is one.
+stretching if there is one. Not so under limits of torque, power and load of winches: friction that grows with speed,
+and products with it, are no lines over u, and at standstill friction acts in either direction. What is found is proved
+then, too, but a smaller stretching may exist, or one where none is found.
 """
 
 import functools

@@ -40,7 +40,7 @@ class Drives:
         friction: (n,) Coulomb friction, N m.
         viscous_friction: (n,) N m s/rad.
         efficiency: (n,) of gear and drum.
-        torque_max: (n,) largest torques of the motors, N m.
+        torque_max: (n,) largest torques of the motors, at standstill, N m; inf without a limit.
         counts: (n,) counts of the encoders a turn; 0: angles are exact.
     """
 

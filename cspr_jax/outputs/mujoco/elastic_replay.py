@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.shapes import Float
-from cspr_jax.outputs.mujoco.mjcf import check_elastic, leads, model_xml, unstretched_of
+from cspr_jax.outputs.mujoco.mjcf import check_elastic, leads, unstretched_of
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import STEP, Played, Suspended, coordinates, played, suspended, upward
-from cspr_jax.outputs.mujoco.replay import PlayedPath, callback_lent, ends_of_steps, played_path
+from cspr_jax.outputs.mujoco.replay import PlayedPath, ends_of_steps, path_under
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.elasticity.equilibrium import Settled, settled
@@ -176,30 +176,15 @@ def _path(
     body: Suspended, moved: Played, qpos: Float[np.ndarray, "nq"], unstretched: Float[np.ndarray, "n n_cables"]
 ) -> PlayedPath:
     # Path from a start, with unstretched lengths over time.
-    mujoco, stiffness, lead = need_mujoco(), body.axial_stiffness, leads(body)
-    rates, reached, row, count = _rates(moved, unstretched), [], 0, len(body.spools)
+    stiffness, lead, rates = body.axial_stiffness, leads(body), _rates(moved, unstretched)
+    count = len(body.spools)
 
-    def control(model: Any, data: Any) -> None:
-        # Twice a step, as in `replay.path_of`.
-        at = row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)
-        strain = (data.ten_length[:count] - lead) / unstretched[at] - 1.0
-        rate = (data.ten_velocity[:count] - (strain + 1.0) * rates[at]) / unstretched[at]
-        data.ctrl[:] = np.maximum(stiffness * strain + body.axial_damping * rate, 0.0)
+    def forces(row: int, data: Any) -> np.ndarray:
+        strain = (data.ten_length[:count] - lead) / unstretched[row] - 1.0
+        rate = (data.ten_velocity[:count] - (strain + 1.0) * rates[row]) / unstretched[row]
+        return np.maximum(stiffness * strain + body.axial_damping * rate, 0.0)
 
-    with callback_lent(mujoco):
-        model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
-        model.actuator_ctrllimited[:] = 0
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-        data.qpos[:] = qpos
-        mujoco.set_mjcb_control(control)
-        for run in moved.runs():
-            reached.append(data.qpos.copy())
-            for row in run[:-1:2]:
-                data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
-                mujoco.mj_step(model, data)
-                reached.append(data.qpos.copy())
-    return played_path(moved, np.array(reached), body.axes)
+    return path_under(body, moved, forces, start=qpos)
 
 
 def _rates(moved: Played, lengths: Float[np.ndarray, "n n_cables"]) -> Float[np.ndarray, "n n_cables"]:

@@ -209,16 +209,26 @@ def played(plan: PlannedMotions, step: float = STEP) -> Played:
     """Motion and tensions of a plan at the times at which MuJoCo needs them."""
     if not 0.0 < step < math.inf:
         raise ConfigError("--step", f"{shown(step)}: must be a number > 0, in s")
-    if not np.isfinite(plan.answers.duration).all():
-        raise ConfigError("plan", "cannot be played: a segment has no motion; see its verdict")
+    check_durations(plan)
     if 2.0 * plan.answers.duration.sum() / step > LARGEST_ROWS:
         raise ConfigError("--step", f"{step:g} s: must give at most {LARGEST_ROWS} rows, two a step")
     taus, times = _step_times(plan, step)
     columns, segment = rows_at(plan, taus), np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
     columns |= {"t": times, "tension": columns["tension" if plan.robot_file.pairs is None else "tension_each"]}
+    check_finite(columns)
+    return in_world(columns, segment, plan.robot_file.z_axis)
+
+
+def check_durations(plan: PlannedMotions) -> None:
+    """Refuse segments without a motion."""
+    if not np.isfinite(plan.answers.duration).all():
+        raise ConfigError("plan", "cannot be played: a segment has no motion; see its verdict")
+
+
+def check_finite(columns: Mapping[str, np.ndarray]) -> None:
+    """Refuse motions and tensions that are not finite."""
     if not all(np.isfinite(columns[name]).all() for name in ("tension", "position", "acceleration")):
         raise ConfigError("plan", "cannot be played: its motion or its tensions are not finite; see its verdicts")
-    return in_world(columns, segment, plan.robot_file.z_axis)
 
 
 def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z_axis: str) -> Played:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,19 +141,38 @@ def ends_of_steps(moved: Played) -> Int[np.ndarray, "n"]:
 
 
 def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
-    """Path of MuJoCo's robot under the tensions of a motion, by MuJoCo's own integrator."""
+    """Path of MuJoCo's robot under the tensions of a motion."""
+    return path_under(body, moved, lambda row, _: moved.tension[row], step, by_segment=by_segment)
+
+
+def path_under(
+    body: Suspended,
+    moved: Played,
+    forces: Callable[[int, Any], Float[np.ndarray, "n_cables"]],
+    step: float = STEP,
+    *,
+    start: Float[np.ndarray, "nq"] | None = None,
+    by_segment: bool = False,
+) -> PlayedPath:
+    """Path of MuJoCo's robot under forces of its cables, by MuJoCo's own integrator.
+
+    Forces are a function of the row of the motion and of MuJoCo's state. From a given `start` they have no limits.
+    """
     mujoco = need_mujoco()
     qpos, rates, _ = coordinates(body, moved)
     reached, row = [], 0
 
     def control(model: Any, data: Any) -> None:
         # RK4 calls this at the start of a step, twice in its middle, and at its end.
-        data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
+        data.ctrl[:] = forces(row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep), data)
 
     with callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)
+        if start is not None:
+            model.actuator_ctrllimited[:] = 0
+            data.qpos[:] = start
         mujoco.set_mjcb_control(control)
         for run in moved.runs():
             if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
@@ -163,7 +182,7 @@ def path_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: b
                 data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
                 mujoco.mj_step(model, data)
                 reached.append(data.qpos.copy())
-    return played_path(moved, np.array(reached), body.axes)
+    return path_at(moved, np.array(reached), body.axes, ends_of_steps(moved))
 
 
 @contextlib.contextmanager
@@ -178,10 +197,12 @@ def callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def played_path(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
-    """Path of the effector from the coordinates at the ends of all steps."""
-    rows = ends_of_steps(moved)
-    position, rotated = moved.position[rows], np.zeros(len(rows))
+def path_at(
+    moved: Played, reached: Float[np.ndarray, "n nq"], axes: Sequence[int], rows: Any = slice(None)
+) -> PlayedPath:
+    """Path of the effector from the coordinates of MuJoCo's joints, at some rows of a motion."""
+    position = np.array(moved.position[rows])
+    rotated = np.zeros(len(position))
     if moved.rotation is None:
         position[:, list(axes)] = reached[:, : len(axes)]
     else:

@@ -9,17 +9,18 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.machine.setpoints import set_points
 from cspr_jax.motion.ticks import ticks
 from cspr_jax.outputs.motion_files import rows_at
-from cspr_jax.outputs.mujoco.closed_loop import Driven, Drives, Loop, WindingSetPoints, driven
+from cspr_jax.outputs.mujoco.closed_loop import Drives, Loop, WindingSetPoints, driven
 from cspr_jax.outputs.mujoco.module import need_mujoco
-from cspr_jax.outputs.mujoco.motion import Played, in_world, suspended, upward
+from cspr_jax.outputs.mujoco.motion import check_durations, check_finite, in_world, suspended, upward
+from cspr_jax.outputs.mujoco.replay import path_at
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.winches import Winches, layer_ends, motor_angles
 
 LARGEST_TICKS = 200_000
@@ -124,6 +125,7 @@ def simulate(plan: PlannedMotions, loop: Loop) -> Simulated:
             raise ConfigError(plan.robot_file.name, f"{name}: must be given, since winches drive elastic cables")
     if not (np.asarray(robot.winches.motor_inertia) > 0.0).all():
         raise ConfigError(plan.robot_file.name, "winch.motor_inertia: must be greater than 0 to drive motors")
+    check_durations(plan)
     duration = float(plan.answers.duration.sum())
     if not duration * loop.rate <= LARGEST_TICKS:
         raise ConfigError("rate", f"{loop.rate:g} Hz: must give at most {LARGEST_TICKS} ticks")
@@ -131,15 +133,22 @@ def simulate(plan: PlannedMotions, loop: Loop) -> Simulated:
     taus = ticks(durations, loop.rate)[1]
     columns = rows_at(plan, taus)
     columns["tension"] = columns["tension" if plan.robot_file.pairs is None else "tension_each"]
+    check_finite(columns)
     segment = np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
     moved, world = in_world(columns, segment, plan.robot_file.z_axis), upward(plan.robot_file.z_axis)
     found_points = set_points(robot, plan.problem.limits, motions, durations, loop.rate, plan.keys.tension_rule)
     body, points = suspended(plan), _winding(found_points, np.asarray(robot.winches.direction))
     stiffness = np.broadcast_to(np.asarray(written.axial_stiffness, float), (len(body.spools),))
     simulation = driven(
-        body, moved, points, _drives(robot.winches, loop), stiffness, _winch_of(plan, len(stiffness)), loop
+        body,
+        moved,
+        points,
+        _drives(robot.winches, plan.problem.limits, loop),
+        stiffness,
+        _winch_of(plan, len(stiffness)),
+        loop,
     )
-    reached, rotated = _poses(moved, simulation, body.axes)
+    reached, rotated = path_at(moved, simulation.coordinates, body.axes)
     return Simulated(
         robot=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -169,7 +178,7 @@ def _winch_of(plan: PlannedMotions, n_cables: int) -> np.ndarray:
     return winch_of
 
 
-def _drives(winches: Winches, loop: Loop) -> Drives:
+def _drives(winches: Winches, limits: Limits, loop: Loop) -> Drives:
     # A drum with layers is linear from layer to layer, one without everywhere.
     if winches.layers is None:
         ends = np.asarray(winches.zero_length) + FAR * np.array([[1.0], [-1.0]])
@@ -179,16 +188,8 @@ def _drives(winches: Winches, loop: Loop) -> Drives:
     friction, viscous = (loop.friction * np.asarray(x) for x in (winches.friction, winches.viscous_friction))
     inertia, efficiency = np.asarray(winches.motor_inertia), np.asarray(winches.efficiency)
     largest = np.full(len(inertia), np.inf)
+    for torque_max in (limits.motor_torque_max, winches.stall_torque):
+        largest = largest if torque_max is None else np.minimum(largest, torque_max)
     of_robot = COUNTS if winches.encoder_counts is None else np.asarray(winches.encoder_counts)
     counts = np.broadcast_to(np.asarray(of_robot if loop.counts is None else loop.counts, float), inertia.shape)
     return Drives(list(angles.T), list(ends.T), inertia, friction, viscous, efficiency, largest, counts)
-
-
-def _poses(moved: Played, simulation: Driven, axes: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    position, rotated = moved.position.copy(), np.zeros(len(moved.position))
-    if moved.rotation is None:
-        position[:, list(axes)] = simulation.coordinates[:, : len(axes)]
-    else:
-        position[:], quaternions = simulation.coordinates[:, :3], np.roll(simulation.coordinates[:, 3:7], -1, axis=1)
-        rotated = (moved.rotation.inv() * Rotation.from_quat(quaternions)).magnitude()
-    return position, rotated
