@@ -104,3 +104,18 @@ def test_friction_holds_motors_that_set_points_leave():
 def test_robots_without_their_numbers_are_refused(robot, words):
     with pytest.raises(ConfigError, match=words):
         cspr_jax.simulate(PLAN | {"robot": robot})
+
+
+def test_motors_give_no_more_torque_than_they_may(plan):
+    largest = 1.001 * float(np.abs(plan.rows(2000.0)["tension"]).max()) * WINCH["drum_radius"] / WINCH["gear_ratio"]
+    for more in ({"motor_torque_max": largest}, {"motor_stall_torque": largest, "motor_no_load_speed": 1e4}):
+        found = cspr_jax.simulate(_plan(**more), mass_factor=1.1, anyway=True)
+        assert np.abs(found.torque_reached).max() == pytest.approx(largest, rel=1e-12)
+
+
+def test_a_plan_without_a_motion_is_not_driven():
+    line = {"schema": 1, "family": "quintic", "robot": ROBOT | {"winch": WINCH}}
+    outside = cspr_jax.plan(line | {"pose": [{"position": [0.0, 0.0, 1.2]}, {"position": [0.5, 0.0, 1.2]}]})
+    assert np.isnan(outside.answers.duration).all()
+    with pytest.raises(ConfigError, match="a segment has no motion; see its verdict"):
+        cspr_jax.simulate(outside, anyway=True)

@@ -62,6 +62,10 @@ class Drives:
             length[k] = lengths[i] - paid_out_per_rad[k] * (x - angles[i])
         return length, paid_out_per_rad
 
+    def clipped(self, torque: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Torques that motors give where these are commanded."""
+        return np.clip(torque, -self.torque_max, self.torque_max)
+
     def next_speed(
         self, speed: np.ndarray, torque: np.ndarray, load: np.ndarray, step: float
     ) -> Float[np.ndarray, "n"]:
@@ -181,10 +185,10 @@ def driven(
     steps = _steps(body, drives, stiffness, paid[winch_of], paid_out_per_rad[winch_of], winch_of, period)
     model.opt.timestep = step = period / steps
     controller = _Controller(points, _gains(body, drives, paid_out_per_rad, loop), drives.counts, loop)
-    waiting = collections.deque([points.torque[0]] * round(loop.delay * loop.rate * steps))
+    waiting = collections.deque([drives.clipped(points.torque[0])] * round(loop.delay * loop.rate * steps))
     speed, recorded = points.speed[0].copy(), _empty(len(points.angle), model.nq, count, len(angle))
     for tick in range(len(points.angle)):
-        command = np.clip(controller.torque(tick, angle), -drives.torque_max, drives.torque_max)
+        command = drives.clipped(controller.torque(tick, angle))
         for k in range(steps):
             waiting.append(command)
             torque = waiting.popleft()
