@@ -15,7 +15,7 @@ from jax import Array
 from cspr_jax.motion.limits import lowest_depth, motor_limits_set
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.search.minima import narrowed_times
+from cspr_jax.numerics.search.minima import CLOSE, narrowed_times
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -31,7 +31,7 @@ BATCH = 512  # number of samples computed at a time
 # Largest number of samples that is held at a time.
 MAX_SAMPLES = 200_000
 # Points of Gauss's rule between two samples, and their weights.
-_GAUSS = np.polynomial.legendre.leggauss(3)
+_GAUSS = np.polynomial.legendre.leggauss(2)
 TINY = 1e-300
 
 
@@ -92,21 +92,13 @@ OF_MOTORS = len(MotorDemands._fields)
 
 
 def _names(robot: Any) -> list[str]:
-    # Extremes that a robot has; those of motors are the last ones.
-    return EXTREMES if robot.winches is not None else EXTREMES[:-OF_MOTORS]
+    # Extremes that a robot has; those of motors are the last ones, and a load needs a line of speed and torque.
+    if robot.winches is None:
+        return EXTREMES[:-OF_MOTORS]
+    return EXTREMES if robot.winches.stall_torque is not None else EXTREMES[:-1]
 
 
-@persistent_jit(static_argnames="rule")
-def _values(robot, limits: Limits, corners, arguments, *, rule: str) -> Array:
-    return jax.vmap(partial(_at_time, robot, limits, corners, rule))(*arguments)
-
-
-@persistent_jit(static_argnames="rule")
-def _values_of_one(robot, limits: Limits, corners, motion: Motion, tau: Array, *, rule: str) -> Array:
-    return jax.vmap(partial(_at_time, robot, limits, corners, rule, motion))(tau)
-
-
-def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
+def _extremes(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
     state = motion.state(tau)
     if robot.n_cables > robot.dof:
         chosen = cables.shared(robot, state, limits, rule)
@@ -141,6 +133,25 @@ def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Arr
     return jnp.stack([table[name] for table in (extremes, nearest) for name in _names(robot)])
 
 
+def _torques(robot, limits: Limits, _, rule: str, motion: Motion, tau: Array) -> Array:
+    state = motion.state(tau)
+    tensions = cables.tensions(robot, state, limits, rule)
+    return motor_demands(robot.winches, cables.cable_motion(robot, state), tensions).motor_torque
+
+
+_AT_TIME: dict[str, Callable[..., Array]] = {"extremes": _extremes, "torques": _torques}
+
+
+@persistent_jit(static_argnames=("rule", "quantity"))
+def _values(case, arguments, *, rule: str, quantity: str) -> Array:
+    return jax.vmap(partial(_AT_TIME[quantity], *case, rule))(*arguments)
+
+
+@persistent_jit(static_argnames=("rule", "quantity"))
+def _values_of_one(case, motion: Motion, tau: Array, *, rule: str, quantity: str) -> Array:
+    return jax.vmap(partial(_AT_TIME[quantity], *case, rule, motion))(tau)
+
+
 def peaks(
     robot: Any,
     motions: Sequence[Motion],
@@ -153,7 +164,7 @@ def peaks(
     # Give every limit of tensions a value, so that one compiled function serves all.
     low, high = tension_range(robot, limits)
     limits = dataclasses.replace(_of_motors(robot, limits), tension_min=low, tension_max=high)
-    table = np.empty((len(motions), 3, len(_names(robot))))
+    table, torques = np.empty((len(motions), 3, len(_names(robot)))), np.full(len(motions), np.nan)
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
@@ -167,18 +178,18 @@ def peaks(
         for first in range(0, len(members), length):
             stage(f"demands of {len(motions)} segments")
             batch = members[first : first + length]
-            table[batch] = _of_alike(
-                robot, limits, corners, rule, [motions[i] for i in batch], [times[i] for i in batch]
-            )
+            alike_motions, tau = [motions[i] for i in batch], np.stack([times[i] for i in batch])
+            along = partial(_along, (robot, limits, corners), alike_motions, rule=rule)
+            table[batch] = _narrowed(along(quantity="extremes"), tau, len(_names(robot)))
+            if robot.winches is not None:
+                torques[batch] = _root_mean_squares(along(quantity="torques"), tau)
     missing = np.full((len(motions), 3, len(EXTREMES) - table.shape[2]), np.nan)
     missing[:, 2] = -1.0
     table = np.concatenate([table, missing], axis=2)
     columns = (table[:, 0] * _SIGNS + 0.0).T  # no -0
-    if robot.winches is None or robot.winches.stall_torque is None:
-        columns[EXTREMES.index("motor_load")] = np.nan
     return Peaks(
         **dict(zip(EXTREMES, columns, strict=True)),
-        motor_torque_rms=_motor_torque_rms(robot, motions, times, limits, rule),
+        motor_torque_rms=torques,
         samples=np.array([len(tau) for tau in times]),
         when=table[:, 1] * np.array([[float(motion.duration())] for motion in motions]),
         cables=table[:, 2].astype(int),
@@ -193,52 +204,35 @@ def _of_motors(robot: Any, limits: Limits) -> Limits:
     return Limits(**{row.name: getattr(limits, row.name) for row in rows})
 
 
-def _motor_torque_rms(
-    robot: Any, motions: Sequence[Motion], times: Sequence[np.ndarray], limits: Limits, rule: str
-) -> np.ndarray:
-    # Integrate squares of torques between samples by Gauss's rule, whose points avoid the jumps of friction at samples.
-    largest = np.full(len(motions), np.nan)
-    for i, (motion, tau) in enumerate(zip(motions, times, strict=True) if robot.winches is not None else ()):
-        width, middle = 0.5 * np.diff(tau), 0.5 * (tau[1:] + tau[:-1])
-        points = (middle[:, None] + width[:, None] * _GAUSS[0]).ravel()
-        kernel = partial(_squared_torques, robot, limits, common_shape(motion), rule=rule)
-        squares = in_batches(kernel, points, batch_size=BATCH)
-        means = (width[:, None] * _GAUSS[1]).ravel() @ squares / max(tau[-1] - tau[0], TINY)
-        largest[i] = np.sqrt(means.max())
-    return largest
-
-
-@persistent_jit(static_argnames="rule")
-def _squared_torques(robot, limits: Limits, motion: Motion, tau: Array, *, rule: str) -> Array:
-    def one(time: Array) -> Array:
-        state = motion.state(time)
-        tensions = cables.tensions(robot, state, limits, rule)
-        return motor_demands(robot.winches, cables.cable_motion(robot, state), tensions).motor_torque ** 2
-
-    return jax.vmap(one)(tau)
-
-
-def _of_alike(
-    robot: Any, limits: Limits, corners: Any, rule: str, motions: list[Motion], times: list[np.ndarray]
-) -> np.ndarray:
-    # Extremes of motions of one structure, their normalised times and their cables, (n, 3, n_extremes).
-    if len(motions) == 1:
-        of_one = partial(_values_of_one, robot, limits, corners, common_shape(motions[0]), rule=rule)
-
-        def along(tau: np.ndarray) -> np.ndarray:
-            return in_batches(of_one, tau.ravel(), batch_size=BATCH).reshape(*tau.shape, -1)
-
-        return _narrowed(along, times[0][None], len(_names(robot)))
-    kernel = partial(_values, robot, limits, corners, rule=rule)
+def _along(case: tuple[Any, Limits, Any], motions: list[Motion], **how: str) -> Callable[[np.ndarray], np.ndarray]:
+    # Values at times (n_motions, n) along motions of one structure, (n_motions, n, ...). Searches for several extremes
+    # meet at the same times, each of which is computed once.
+    shape = common_shape(motions[0])
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(array, float) for array in leaves]), *motions)
 
-    def at(tau: np.ndarray) -> np.ndarray:
-        motion = np.repeat(np.arange(len(tau)), tau.shape[1])
-        items = jax.tree.map(lambda array: array[motion], stacked)
-        values = in_batches(kernel, (items, tau.ravel()), batch_size=BATCH)
-        return values.reshape(*tau.shape, -1)
+    def values(tau: np.ndarray) -> np.ndarray:
+        if len(motions) == 1:
+            times, rows = np.unique(tau, return_inverse=True)
+            computed = in_batches(partial(_values_of_one, case, shape, **how), times, batch_size=BATCH)
+        else:
+            times, rows = np.unique(np.arange(len(tau))[:, None] + 1j * tau, return_inverse=True)
+            items = jax.tree.map(lambda array: array[times.real.astype(int)], stacked)
+            computed = in_batches(partial(_values, case, **how), (items, times.imag), batch_size=BATCH)
+        return computed[rows.reshape(tau.shape)]
 
-    return _narrowed(at, np.stack(times), len(_names(robot)))
+    return values
+
+
+def _root_mean_squares(torques: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
+    # Integrate squares between every other sample, and joints of pieces, by Gauss's rule, whose points avoid jumps of
+    # friction at samples; take the largest mean of a motor, (n_motions,).
+    is_joint = (np.diff(tau) <= CLOSE).any(0)
+    edges = tau[:, (np.arange(tau.shape[1]) % 2 == 0) | np.append(is_joint, True) | np.append(True, is_joint)]
+    width, middle = 0.5 * np.diff(edges), 0.5 * (edges[:, 1:] + edges[:, :-1])
+    points = (middle[..., None] + width[..., None] * _GAUSS[0]).reshape(len(tau), -1)
+    weights = (width[..., None] * _GAUSS[1]).reshape(len(tau), -1, 1)
+    means = np.sum(weights * torques(points) ** 2, axis=1) / np.maximum(tau[:, -1] - tau[:, 0], TINY)[:, None]
+    return np.sqrt(means.max(1))
 
 
 def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, count: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from cspr_jax.robots.bounds.state_bounds import StateBounds, at_rest
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.bounds.batch import batch_key
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.verification.criteria import ALL, AT_TIMES, Criterion, CriterionParts, criteria, levels
@@ -233,15 +234,36 @@ def proofs_of_each(
     if not all(hasattr(motion, "bounds") for motion in motions) or not np.isfinite(durations).all():
         return [proof_of(problem, motion, scene, **how) for motion in motions]
 
+    jumps = [motion.jumps() if hasattr(motion, "jumps") else np.empty(0) for motion in motions]
+    return proofs_of(problem, bounds_together(motions), durations, scene, jumps, **how)
+
+
+def bounds_together(motions: Sequence[Any]) -> ManyBounds:
+    """Bounds of the states of several motions; those that one batch can hold are bounded in one call."""
+    groups: dict[Hashable, list[int]] = {}
+    for i, motion in enumerate(motions):
+        groups.setdefault(batch_key(motion) if hasattr(motion, "batch") else i, []).append(i)
+    batch, number = np.empty(len(motions), int), np.empty(len(motions), int)
+    for k, members in enumerate(groups.values()):
+        batch[members], number[members] = k, range(len(members))
+    batches = [_batch_bounds([motions[i] for i in members]) for members in groups.values()]
+
     def bounds(index: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
-        chosen = np.unique(index).tolist()
-        rows = [np.flatnonzero(index == i) for i in chosen]
-        parts = [motions[i].bounds(start[row], end[row]) for i, row in zip(chosen, rows, strict=True)]
+        chosen = np.unique(batch[index]).tolist()
+        rows = [np.flatnonzero(batch[index] == k) for k in chosen]
+        parts = [batches[k](number[index[row]], start[row], end[row]) for k, row in zip(chosen, rows, strict=True)]
+        if len(parts) == 1:
+            return parts[0]
         order = np.argsort(np.concatenate(rows))
         return jax.tree.map(lambda *leaves: np.concatenate([np.asarray(array) for array in leaves])[order], *parts)
 
-    jumps = [motion.jumps() if hasattr(motion, "jumps") else np.empty(0) for motion in motions]
-    return proofs_of(problem, bounds, durations, scene, jumps, **how)
+    return bounds
+
+
+def _batch_bounds(motions: list[Any]) -> ManyBounds:
+    if hasattr(motions[0], "batch"):
+        return motions[0].batch(motions).bounds
+    return lambda _, start, end: motions[0].bounds(start, end)
 
 
 def _criteria(problem: Problem, scene: Scene | None, parts: CriterionParts) -> tuple[Criterion, ...]:

@@ -48,7 +48,9 @@ def test_largest_torque(torques):
 def test_root_mean_square(torques):
     times, values = torques
     rms = float(np.sqrt(np.trapezoid(values**2, times, axis=0) / times[-1]).max())
-    assert _segment(motor_torque_rms_max=rms * (1.0 + BESIDE))[1]["verdict"] == "feasible"
+    kept = _segment(motor_torque_rms_max=rms * (1.0 + BESIDE))[1]
+    # Friction jumps between the points of the rule where a cable stops winding.
+    assert kept["verdict"] == "feasible" and kept["motor_torque_rms_max"] == pytest.approx(rms, rel=5e-4)
     assert _segment(motor_torque_rms_max=rms * (1.0 - BESIDE))[1]["verdict"] == "motor_over_torque_rms"
 
 

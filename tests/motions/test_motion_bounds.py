@@ -19,6 +19,8 @@ from cspr_jax.motion.motion import Backwards
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.verification.bounds.batch import batch_key
+from cspr_jax.verification.proved_answers import bounds_together
 
 # A polynomial of a user, whose end bends; it serves transitions alone.
 BENT = amplitudes.from_polynomial([0.0, 0.0, 0.0, 4.0, -3.0])
@@ -109,6 +111,20 @@ def test_bands_contain_states(name):
         rng = np.random.default_rng(100 + seed)
         for width in (1.0 / 40.0, 1.0 / 300.0, 1e-6):
             assert excess(drawn(name, seed), rng, width)[0] <= 1e-12
+
+
+def test_motions_bounded_together_have_the_bounds_of_each():
+    """Two swings of one amplitude function, one of another, and a line, in blocks that are mixed."""
+    motions = [drawn("hypocycloid-standard", 1), drawn("cubic", 2), drawn("hypocycloid-standard", 3)]
+    motions.append(swing(SMOOTH, np.random.default_rng(4)))
+    together, rng = bounds_together(motions), np.random.default_rng(5)
+    index = rng.integers(0, len(motions), 40)
+    start, end = (np.array([float(motions[i].duration()) for i in index]) * x for x in (rng.random(40) / 2, 0.6))
+    bounds = together(index, start, end)
+    for i, motion in enumerate(motions):
+        alone = motion.bounds(start[index == i], end[index == i])
+        jax.tree.map(lambda a, b, i=i: np.testing.assert_array_equal(np.asarray(a)[index == i], b), bounds, alone)
+    assert batch_key(motions[0]) == batch_key(motions[2]) != batch_key(motions[3])
 
 
 # What does not compile another kernel is quick enough.

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -27,7 +28,6 @@ from cspr_jax.families.platforms.slerp_bounds import orientation_bounds, rotatio
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.swing_plane import swing_plane
-from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.rotation_bounds import unit_rotation_bounds
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear import rotations
@@ -39,11 +39,9 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.wrench_balance import normalised_determinant
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
+from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds
+from cspr_jax.verification.bounds.batch import MotionBatch
 from cspr_jax.verification.bounds.swing_bounds import swing_bounds
-
-# Number of blocks whose bounds are computed at a time.
-BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -225,16 +223,15 @@ class PlatformMotion:
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
-        blocks = time_bounds(self.amplitude, self.duration(), start, end, orders=4)
-        return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, batch_size=BATCH)
+        return self.batch([self]).bounds(np.zeros(len(start), int), start, end)
+
+    @staticmethod
+    def batch(motions: Sequence["PlatformMotion"]) -> MotionBatch:
+        """A batch of motions of one `batch_key`, which proofs bound together."""
+        return MotionBatch.of(motions, partial(batch_bounds, kind=motions[0].kind), orders=4)
 
 
 @persistent_jit(static_argnames="kind", compiler_options=compile_options.proof_options())
-def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
-    return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
-
-
-@persistent_jit(static_argnames="kind")
 def batch_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
     """Bounds of the states of a batch of motions, each over one block."""
     return jax.vmap(partial(_block_bounds, kind))(*cases)

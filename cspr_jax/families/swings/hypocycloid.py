@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from functools import partial
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -29,7 +29,6 @@ from jax import Array
 
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.swing_plane import swing_plane
-from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.robots.bounds.state_bounds import StateBounds
@@ -38,11 +37,9 @@ from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
-from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
+from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds
+from cspr_jax.verification.bounds.batch import MotionBatch
 from cspr_jax.verification.bounds.swing_bounds import swing_bounds
-
-# Number of blocks whose bounds are computed at a time.
-BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -241,16 +238,15 @@ class Hypocycloid:
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
-        blocks = time_bounds(self.amplitude, self.duration(), start, end)
-        return in_batches(partial(_bounds, self.segment, self.arcs), blocks, batch_size=BATCH)
+        return self.batch([self]).bounds(np.zeros(len(start), int), start, end)
+
+    @staticmethod
+    def batch(motions: Sequence["Hypocycloid"]) -> MotionBatch:
+        """A batch of motions of one `batch_key`, which proofs bound together."""
+        return MotionBatch.of(motions, batch_bounds)
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
-    return jax.vmap(partial(_block_bounds, segment, arcs))(blocks)
-
-
-@jax.jit
 def batch_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
     """Bounds of the states of a batch of motions, each over one block."""
     return jax.vmap(_block_bounds)(*cases)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import jax
@@ -27,6 +27,13 @@ class MotionBatch:
         """Keep data that all motions share."""
         self._motions, self.durations, self._kernel, self._orders = motions, np.asarray(durations), kernel, orders
 
+    @classmethod
+    def of(cls, motions: Sequence[Any], kernel: Callable[[Any], StateBounds], *, orders: int = 3) -> "MotionBatch":
+        """Motions of one `batch_key` as a batch."""
+        cases = jax.tree.map(lambda *leaves: np.stack(leaves), *[(each.segment, each.arcs) for each in motions])
+        joined = dataclasses.replace(motions[0], segment=cases[0], arcs=cases[1])
+        return cls(joined, np.array([float(each.duration()) for each in motions]), kernel, orders=orders)
+
     def __getitem__(self, i: int) -> Any:
         segment, arcs = self._select(i)
         return dataclasses.replace(self._motions, segment=segment, arcs=as_float64(arcs))
@@ -46,3 +53,10 @@ class MotionBatch:
 
     def _select(self, chosen: Any) -> Any:
         return jax.tree.map(lambda leaves: np.asarray(leaves)[chosen], (self._motions.segment, self._motions.arcs))
+
+
+def batch_key(motion: Any) -> Hashable:
+    """Key that motions share which one batch can hold: kind, shapes of their data, and amplitude function."""
+    leaves, structure = jax.tree.flatten(motion)
+    amplitude = tuple(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(motion.amplitude))
+    return structure, tuple(np.shape(leaf) for leaf in leaves), amplitude
