@@ -1,10 +1,14 @@
 """Winches under control in MuJoCo, beside an integration of the same equations by SciPy; what control is good for."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import cspr_jax
+from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.errors import ConfigError
 
 pytest.importorskip("mujoco")
@@ -119,3 +123,42 @@ def test_a_plan_without_a_motion_is_not_driven():
     assert np.isnan(outside.answers.duration).all()
     with pytest.raises(ConfigError, match="a segment has no motion; see its verdict"):
         cspr_jax.simulate(outside, anyway=True)
+
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+
+
+def _of_catalogue(name, stiffness, **winch):
+    return tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) | {
+        "axial_stiffness": stiffness,
+        "winch": winch | {"viscous_friction": 1e-5, "efficiency": 0.9},
+    }
+
+
+def _keeps(found, position, end, rotation, tension):
+    assert found.error.max() < position and found.error[-1] < end and found.rotated.max() < rotation
+    assert np.abs(found.tension_reached - found.tension).max() < tension
+    assert found.tension_reached.min() > 0.0
+
+
+@pytest.mark.thorough
+def test_the_camera_of_the_documents_keeps_its_bounds():
+    _keeps(cspr_jax.simulate(EXAMPLES / "camera_plan.toml"), 2.5e-3, 1e-4, 1e-9, 3.0)
+
+
+@pytest.mark.soak
+def test_a_platform_on_six_cables_keeps_the_bounds_of_the_documents():
+    winch = {"drum_radius": 0.03, "gear_ratio": 5.0, "motor_inertia": 5e-5, "friction": 0.02}
+    target = {"position": [0.5, 0.2, 1.3], "tilt_torsion": [0.5, 0.2, 0.0]}
+    plan = {"schema": 1, "family": "hypocycloid", "z0": 1.4, "pose": [{"rest": True}, target, {"rest": True}]}
+    found = cspr_jax.simulate(plan | {"robot": _of_catalogue("laval-mssm", 2e5, **winch)})
+    _keeps(found, 2.5e-4, 5e-5, 1e-3, 1.0)
+
+
+@pytest.mark.soak
+def test_cogiro_keeps_the_bounds_of_the_documents():
+    winch = {"drum_radius": 0.05, "gear_ratio": 15.0, "motor_inertia": 1.5e-3, "friction": 0.3}
+    at = {0: [0, 0, 1.5], 2: [2, 1, 2.0], 5: [-2, 1.5, 1.2], 7: [0, 0, 1.5]}
+    poses = [{"position": list(map(float, position)), "time": float(time)} for time, position in at.items()]
+    plan = {"schema": 1, "family": "spline", "pose": poses, "robot": _of_catalogue("cogiro", 1e6, **winch)}
+    _keeps(cspr_jax.simulate(plan), 3e-4, 3e-4, 2e-4, 8.0)
