@@ -58,5 +58,5 @@ class MotionBatch:
 def batch_key(motion: Any) -> Hashable:
     """Key that motions share which one batch can hold: kind, shapes of their data, and amplitude function."""
     leaves, structure = jax.tree.flatten(motion)
-    amplitude = tuple(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(motion.amplitude))
-    return structure, tuple(np.shape(leaf) for leaf in leaves), amplitude
+    amplitude = tuple(np.asarray(array).tobytes() for array in jax.tree.leaves(motion.amplitude))
+    return structure, tuple(np.shape(array) for array in leaves), amplitude
