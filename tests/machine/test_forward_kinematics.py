@@ -9,6 +9,9 @@ from support import cable_robots
 
 import cspr_jax
 from cspr_jax.errors import InputError
+from cspr_jax.machine.forward_kinematics import solutions
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.workspaces.poses import geometry
 
 SPOOLS = [[0.3, -0.2, 0.1], [-0.25, -0.1, 0.0], [0.0, 0.3, -0.05]]
 POINTS = ("1T", "2T", "3T")
@@ -187,7 +190,34 @@ def test_six_poses_of_a_planar_platform():
     assert numbers.max() == 6
 
 
-CASES = [("3T", 5), ("2T", 3), ("1T", 3), ("1R2T", 4), ("2R3T", 5), ("2R3T", 7), ("3R3T", 6), ("3R3T", 8), ("3R", 4)]
+def test_chunks_of_lengths_change_nothing(monkeypatch):
+    """All solutions of many sets are those of few at a time, in tables of one width."""
+    rng = np.random.default_rng(31)
+    for given in (cable_robots.any_robot(rng, "1R2T", 3), cable_robots.any_robot(rng, "1R2T", 4)):
+        robot, lengths = _built(given), _random_lengths(given, rng, 23)
+        at_once = cspr_jax.forward(robot, lengths, all_solutions=True), cspr_jax.forward(robot, lengths)
+        monkeypatch.setattr(solutions, "CHUNK", 5)
+        by_parts = cspr_jax.forward(robot, lengths, all_solutions=True), cspr_jax.forward(robot, lengths)
+        monkeypatch.undo()
+        for first, second in zip(at_once, by_parts, strict=True):
+            for name in ("positions", "quaternions", "is_found", "count", "steps", "all_positions", "all_quaternions"):
+                np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_lengths_in_lanes_are_those_of_single_poses():
+    """The fast form beside the readable one, with wheels on some cables and points for others."""
+    rng = np.random.default_rng(32)
+    for pattern, cables in (("3R3T", 8), ("3T", 4)):
+        given = cable_robots.any_robot(rng, pattern, cables)
+        for radius in (None, np.where(np.arange(cables) % 2, 0.08, 0.0)):
+            robot = _built(
+                given, **({} if radius is None else {"pulley_radius": radius, "pulley_axes": [0.1, -0.2, 1]})
+            )
+            positions, quaternions, *_ = _posed(given, rng, 12)
+            with double_precision():
+                quick = geometry.length_lanes(robot, tuple(positions.T), tuple(quaternions.T))
+                plain = geometry.cable_lengths(robot, positions, quaternions)
+            np.testing.assert_allclose(np.asarray(quick).T, plain, rtol=1e-14)
 
 
 def _near(given, rng, positions, quaternions):

@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 from scipy.optimize import minimize, nnls
 
-from cspr_jax.machine.forward_kinematics.least_squares import lengths_in_lanes, moved
+from cspr_jax.machine.forward_kinematics.least_squares import moved
 from cspr_jax.machine.forward_kinematics.solutions import Search, SolvedPoses
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.numerics.shapes import Float
@@ -156,7 +156,7 @@ def _depth_and_lengths(robot: AnyRobot, pose: Array, move: Array, radius: Array)
     depth = pose[2]
     if PATTERNS[robot.pattern].is_jointed and isinstance(robot, PlatformRobot) and robot.centre_of_mass is not None:
         depth = depth + (matrix(pose[3:]) @ robot.centre_of_mass)[2]
-    lengths = lengths_in_lanes(robot, tuple(x[None] for x in pose[:3]), tuple(x[None] for x in pose[3:]))
+    lengths = geometry.length_lanes(robot, tuple(x[None] for x in pose[:3]), tuple(x[None] for x in pose[3:]))
     return jnp.concatenate([depth[None], lengths[:, 0]])
 
 

@@ -22,7 +22,6 @@ from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot, across_line
-from cspr_jax.robots.model.pulleys import exit_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.workspaces.poses import geometry
 
@@ -159,31 +158,13 @@ def _fit(
 
 
 def _evaluated(robot, lengths, weights, radius, position, quaternion) -> tuple[Array, tuple[Array, ...], Array]:
-    residual = lengths_in_lanes(robot, tuple(position), tuple(quaternion)) - lengths
+    residual = geometry.length_lanes(robot, tuple(position), tuple(quaternion)) - lengths
     columns, _ = geometry.wrench_columns(robot, tuple(position), _turning(robot, quaternion), radius)
     return residual, tuple(columns), jnp.sum(weights[:, None] * residual**2, axis=0)
 
 
 def _turning(robot: AnyRobot, quaternion: Array) -> Vector | None:
     return tuple(quaternion) if isinstance(robot, PlatformRobot) else None
-
-
-def lengths_in_lanes(robot: AnyRobot, position: Vector, quaternion: Vector) -> Float[Array, "n_cables k"]:
-    """Lengths of the cables, arcs on pulleys included, one lane a pose."""
-    arms = geometry.turned_arms(robot, quaternion)
-    shape = robot.n_cables, len(position[0])
-    target = [jnp.broadcast_to(x[None], shape) for x in position]
-    if arms is not None:
-        target = [x + arm for x, arm in zip(target, arms, strict=True)]
-    base = tuple(jnp.broadcast_to(robot.base_points[:, i, None], shape) for i in range(3))
-    if robot.pulleys is None:
-        ray = tuple(x - b for x, b in zip(target, base, strict=True))
-        return jnp.sqrt(lanes.dot(ray, ray))
-    axes = tuple(jnp.broadcast_to(robot.pulleys.axes[:, i, None], shape) for i in range(3))
-    radius = jnp.broadcast_to(robot.pulleys.radius[:, None], shape)
-    around = exit_lanes(base, axes, jnp.where(radius > 0.0, radius, TINY), tuple(target))
-    ray = tuple(x - b for x, b in zip(target, base, strict=True))
-    return jnp.where(radius > 0.0, around.wrapped + around.free, jnp.sqrt(lanes.dot(ray, ray)))
 
 
 def _step(current: _Lanes, weights: Array) -> list[Array]:

@@ -35,6 +35,7 @@ WORSE = 3.0
 SPATIAL_STARTS, PLANAR_STARTS = 64, 12
 BATCH = 4096
 PART = 1 << 14
+CHUNK = 1 << 12  # sets of lengths whose solutions are sought at once
 _COLUMNS = ("positions", "quaternions", "residuals", "is_found", "steps")
 
 
@@ -103,21 +104,22 @@ class Search:
         """One solution each: that found from a level platform below the spools, or the first one that is found."""
         positions, quaternions = self._starts(lengths, np.array([IDENTITY]))
         solutions = self._fitted_all(lengths, positions, quaternions)
-        poor = self._is_poor(solutions)
-        best = self._select_first(solutions)
-        if poor.any():
-            others = self._select_first(self._from_many(lengths[poor]))
+        poor, best = np.flatnonzero(self._is_poor(solutions)), self._select_first(solutions)
+        for first in range(0, len(poor), CHUNK):
+            part = poor[first : first + CHUNK]
+            others = self._select_first(self._from_many(lengths[part]))
             for name in _COLUMNS:
-                getattr(best, name)[poor] = getattr(others, name)
+                getattr(best, name)[part] = getattr(others, name)
         return best
 
     def all_solutions(self, lengths: Float[np.ndarray, "n m"]) -> SolvedPoses:
         """All solutions, those first in which a robot at rest can hang, and of these the lowest."""
         if self.is_closed:
             return self._closed(lengths)
-        if self._is_planar:
-            return self._ordered(self._planar(lengths))
-        return self._ordered(self._distinct(self._from_many(lengths)))
+        find = self._planar if self._is_planar else lambda part: self._distinct(self._from_many(part))
+        # Each set of lengths takes some 30 kB while its solutions are sought.
+        parts = [lengths[first : first + CHUNK] for first in range(0, max(len(lengths), 1), CHUNK)]
+        return _joined([self._ordered(find(part)) for part in parts])
 
     @property
     def is_closed(self) -> bool:
@@ -293,6 +295,19 @@ class Search:
         with np.errstate(all="ignore"):
             inverse = np.linalg.pinv(np.where(is_regular[:, None, None], matrices, 0.0))
         return is_regular & ((inverse @ loads[..., None])[..., 0] >= 0.0).all(1)
+
+
+def _joined(parts: list[SolvedPoses]) -> SolvedPoses:
+    # Tables of different widths as one, padded.
+    width = max(part.is_found.shape[1] for part in parts)
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        empty = np.nan if values.dtype == float else 0
+        columns = ((0, 0), (0, width - values.shape[1]), *[(0, 0)] * (values.ndim - 2))
+        return np.pad(values, columns, constant_values=empty)
+
+    tables = {name: np.concatenate([padded(getattr(part, name)) for part in parts]) for name in _COLUMNS}
+    return SolvedPoses(**tables, is_complete=parts[0].is_complete)
 
 
 def _first(poses: SolvedPoses, count: int) -> SolvedPoses:
