@@ -9,23 +9,16 @@ begin with # are comments; empty cells and nan are gaps. Times increase, in any 
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.headed_tables import HeadedTable, read_headed
 from cspr_jax.config.motions.heads import ANGLES, LENGTHS, TIMES
-from cspr_jax.config.reading import decoded, opened
-from cspr_jax.errors import ConfigError, shown
-from cspr_jax.errors.suggestions import look_alike
+from cspr_jax.errors import ConfigError
 
-LARGEST_FILE = 1 << 28  # bytes
-LARGEST_ROWS = 2_000_000
-LARGEST_NUMBER = 1e12
-GAPS = ("", "nan", "na", "null", "none")
-_HEAD = re.compile(r"^(length|angle|tension)_?([1-9]\d{0,3})$|^(t|time)$")
-_UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]$")
+_HEAD = re.compile(r"(length|angle|tension)_?([1-9]\d{0,3})|(t|time)")
 FORCES = {"N": 1.0, "kN": 1000.0, "mN": 0.001}
 UNITS = {"t": TIMES, "length": LENGTHS, "angle": ANGLES, "tension": FORCES}
 _WORDS = "t, length_1, length_2, ... or angle_1, angle_2, ..., and tension_1, ... if there are any"
@@ -54,19 +47,13 @@ class CableLog:
 
 def read_cable_log(path: Path, n_cables: int | None = None, *, needs_times: bool = False) -> CableLog:
     """Read a log, of a robot with so many cables if that is known."""
-    rows = [(number, text) for number, text in enumerate(_text(path).split("\n"), 1) if _has_content(text)]
-    if len(rows) < 2:
-        raise ConfigError(path, f"{len(rows)} lines: must be a header line and rows below it: {_WORDS}")
-    if len(rows) - 1 > LARGEST_ROWS:
-        raise ConfigError(path, f"{len(rows) - 1} rows: must be at most {LARGEST_ROWS}")
-    (head_line, head), *body = rows
-    delimiter = next((separator for separator in (";", "\t") if separator in head), ",")
-    heads = [cell.strip().strip('"') for cell in head.split(delimiter)]
-    columns, factors = _columns(path, head_line, heads)
-    table = _numbers(path, body, heads, columns, delimiter)
-    groups = _groups(path, head_line, columns, n_cables, needs_times=needs_times)
-    values = {name: table[:, order] * np.array([factors[k] for k in order]) for name, order in groups.items()}
-    lines = np.array([number for number, _ in body])
+    table = read_headed(path, _WORDS)
+    groups = _groups(table, _columns(table), n_cables, needs_times=needs_times)
+    columns = [(k, table.factor(k, UNITS[name])) for name, indices in groups.items() for k in indices]
+    numbers = table.numbers(*zip(*columns, strict=True))
+    ends = np.cumsum([len(indices) for indices in groups.values()])[:-1]
+    values = dict(zip(groups, np.split(numbers, ends, axis=1), strict=True))
+    lines = np.array(table.lines)
     times = values["t"][:, 0] if "t" in values else None
     if times is not None:
         _check_times(path, times, lines)
@@ -75,89 +62,35 @@ def read_cable_log(path: Path, n_cables: int | None = None, *, needs_times: bool
     return CableLog(times, values.get("length"), angles, values.get("tension"), lines, (both,) if both else ())
 
 
-def _text(path: Path) -> str:
-    with opened(path) as file:
-        data = file.read(LARGEST_FILE + 1)
-    if len(data) > LARGEST_FILE:
-        raise ConfigError(path, f"is longer than {LARGEST_FILE} bytes: must be shorter")
-    if data.startswith((b"\x89HDF", b"PK\x03\x04")) or b"\0" in data[:4096]:
-        raise ConfigError(path, "is not a table of text: must be CSV")
-    return decoded(data, path)
-
-
-def _has_content(text: str) -> bool:
-    return bool(text.strip(" \t,;")) and not text.lstrip().startswith("#")
-
-
-def _columns(path: Path, line: int, heads: list[str]) -> tuple[dict[tuple[str, int], int], dict[int, float]]:
-    # Places of columns by name and number of the cable, and factors to SI units.
+def _columns(table: HeadedTable) -> dict[tuple[str, int], int]:
+    # Indices of columns by the name of their quantity and the number of the cable.
     columns: dict[tuple[str, int], int] = {}
-    factors: dict[int, float] = {}
-    for k, head in enumerate(heads):
-        with_unit = _UNIT.match(head)
-        name, unit = (with_unit[1], with_unit[2]) if with_unit else (head, "")
-        match = _HEAD.match(name.strip().lower())
+    for k in range(len(table.heads)):
+        match = _HEAD.fullmatch(table.name_and_unit(k)[0])
         if match is None:
             continue
-        kind = "t" if match[3] else match[1]
-        key = kind, 0 if match[3] else int(match[2])
-        label = f"line {line}, column {k + 1}: {shown(head)}"
+        key = ("t", 0) if match[3] else (match[1], int(match[2]))
         if key in columns:
-            raise ConfigError(path, f"{label}: stands twice: must stand once")
-        if unit and unit not in UNITS[kind]:
-            raise ConfigError(path, f"{label}: unit {shown(unit)}: must be {', '.join(UNITS[kind])}")
-        columns[key], factors[k] = k, UNITS[kind].get(unit, 1.0)
-    return columns, factors
-
-
-def _numbers(
-    path: Path, body: list[tuple[int, str]], heads: list[str], columns: dict[tuple[str, int], int], delimiter: str
-) -> np.ndarray:
-    read = sorted(columns.values())
-    table = np.full((len(body), len(heads)), np.nan)
-    for i, (line, text) in enumerate(body):
-        cells = text.split(delimiter)
-        if len(cells) != len(heads):
-            raise ConfigError(path, f"line {line}: {len(cells)} values: must be {len(heads)}, as in the header")
-        for k in read:
-            try:
-                table[i, k] = float(cells[k])
-            except ValueError:
-                table[i, k] = _number(path, line, k, heads[k], cells[k].strip().strip('"'), delimiter)
-            if abs(table[i, k]) > LARGEST_NUMBER:
-                raise ConfigError(path, f"{_at(line, k, heads[k], cells[k].strip())}: must be a finite number")
-    return table
-
-
-def _number(path: Path, line: int, k: int, head: str, cell: str, delimiter: str) -> float:
-    if cell.lower() in GAPS:
-        return math.nan
-    try:
-        return float(cell.replace(",", ".") if delimiter != "," else cell)
-    except ValueError:
-        words = f"must be a number, or empty for a gap{look_alike(cell[:100])}"
-        raise ConfigError(path, f"{_at(line, k, head, cell)}: {words}") from None
-
-
-def _at(line: int, k: int, head: str, cell: str) -> str:
-    return f"line {line}, column {k + 1}: {head} = {shown(cell)}"
+            raise table.error("stands twice: must stand once", k)
+        columns[key] = k
+    return columns
 
 
 def _groups(
-    path: Path, line: int, columns: dict[tuple[str, int], int], n_cables: int | None, *, needs_times: bool
+    table: HeadedTable, columns: dict[tuple[str, int], int], n_cables: int | None, *, needs_times: bool
 ) -> dict[str, list[int]]:
     # Columns of each quantity, in the order of the cables.
     numbers = {name: sorted(n for key, n in columns if key == name) for name in UNITS}
     if not numbers["length"] and not numbers["angle"]:
-        raise ConfigError(path, f"line {line}: no column length_1 or angle_1: must have {_WORDS}")
+        raise table.error(f"no column length_1 or angle_1: must have {_WORDS}")
     if needs_times and not numbers["t"]:
-        raise ConfigError(path, f"line {line}: no column t: must have {_WORDS}")
+        raise table.error(f"no column t: must have {_WORDS}")
     for name in ("length", "angle", "tension"):
         indices = numbers[name]
         count = n_cables or len(numbers["length"] or numbers["angle"])
         if indices and indices != list(range(1, count + 1)):
             heads = ", ".join(f"{name}_{n}" for n in indices)
-            raise ConfigError(path, f"line {line}: columns {heads}: must be {name}_1 to {name}_{count}, one a cable")
+            raise table.error(f"columns {heads}: must be {name}_1 to {name}_{count}, one a cable")
     return {name: [columns[name, n] for n in indices] for name, indices in numbers.items() if indices}
 
 

@@ -88,13 +88,13 @@ def test_angles_set_the_zero_of_the_winches(folder):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "m.csv: no measurements: must be a line with the names"),
-        (f"{HEAD}\n", "m.csv: no measurements"),
+        ("", "m.csv: is empty: must be a line with names of columns, length_1"),
+        (f"{HEAD}\n", "m.csv: a header line alone: must be a line with names of columns, length_1"),
         ("length_1,length_2,length_4\n1,1,1", 'line 1, column 3: "length_4": did you mean length_'),
-        ("length_1,x,x\n1,1,1", 'line 1, column 3: "x" stands twice'),
+        ("length_1,x,x\n1,1,1", 'line 1, column 3: "x": stands twice'),
         ("length_1,angle_2\n1,1", "line 1: lengths and angles: must be one of them"),
         ("x,y,z\n1,1,1", "line 1: no column length_1 or angle_1: must have 3"),
-        ("length_1 [deg],x\n1,1", 'line 1, column 1: unit of length_1 = "deg": must be "m", "dm"'),
+        ("length_1 [deg],x\n1,1", 'line 1, column 1: "length_1 [deg]": unit "deg": must be "m", "dm"'),
         ("length_1,qw,qx\n1,1,0", "line 1: no column qy: must have qw, qx, qy, qz, or none"),
         (f"{HEAD}\n1,1,1,0,0", "line 2: 5 values: must be 6, as in the header"),
         (f"# a\n{HEAD}\n1,1,1,0,0,one", 'line 3, column 6: z = "one": must be a finite number, or empty'),

@@ -227,6 +227,10 @@ def test_tables_of_all_kinds(tmp_path):
     np.testing.assert_allclose(log.times, [0.0, 0.01])
     np.testing.assert_allclose(log.lengths, [[1.2, 1.0005], [1.3, np.nan]])
     assert log.lines.tolist() == [4, 6] and log.angles is None and log.tensions is None
+    path.write_text('t_ms,length_1/mm,"length_2",note\n0,1e3,2,"a, b"\n5,NaN,3 # c\n'.replace(" # c", ",d # c"))
+    log = read_cable_log(path, 2)
+    np.testing.assert_allclose(log.times, [0.0, 0.005])
+    np.testing.assert_allclose(log.lengths, [[1.0, 2.0], [np.nan, 3.0]])
     path.write_text("t\tangle_1 [deg]\ttension_1 [kN]\n0\t180\t0.1\n")
     log = read_cable_log(path)
     np.testing.assert_allclose([log.angles[0, 0], log.tensions[0, 0]], [np.pi, 100.0])
@@ -235,15 +239,20 @@ def test_tables_of_all_kinds(tmp_path):
 HEAD = "t,length_1,length_2,length_3\n"
 MISTAKES = {
     "no number": ("t1,length_1,length_2,length_3\n0,1,1,1\n", "line 1: no column t: must have t, length_1"),
-    "cell": (HEAD + "0,1,1,1\n1,1,abc,1\n", 'line 3, column 3: length_2 = "abc": must be a number, or empty for a gap'),
+    "cell": (HEAD + "0,1,1,1\n1,1,abc,1\n", 'line 3, column 3: length_2 = "abc": must be a finite number, or empty'),
+    "underscore": (HEAD + "0,1,1_0,1\n", 'line 2, column 3: length_2 = "1_0": must be a finite number, or empty'),
+    "digits": (HEAD + "0,1,١,1\n", 'line 2, column 3: length_2 = "١": must be a finite number, or empty'),
     "count": (HEAD + "0,1,1\n", "line 2: 3 values: must be 4, as in the header"),
     "times": (HEAD + "1,1,1,1\n1,1,1,1\n", "line 3: t = 1: must be more than 1, the time before it"),
     "no time": ("length_1,length_2,length_3\n1,1,1\n", "line 1: no column t: must have t, length_1"),
     "no length": ("t,x\n0,1\n", "line 1: no column length_1 or angle_1: must have t, length_1"),
     "missing": ("t,length_1,length_3\n0,1,1\n", "line 1: columns length_1, length_3: must be length_1 to length_3"),
     "twice": ("t,length_1,length_1\n0,1,1\n", 'line 1, column 3: "length_1": stands twice: must stand once'),
-    "unit": ("t,length_1 [N]\n0,1\n", 'line 1, column 2: "length_1 [N]": unit "N": must be m, dm, cm'),
-    "empty": ("", "0 lines: must be a header line and rows below it"),
+    "unit": (
+        "t,length_1 [N],length_2,length_3\n0,1,1,1\n",
+        'line 1, column 2: "length_1 [N]": unit "N": must be "m", "dm", "cm"',
+    ),
+    "empty": ("", "is empty: must be a line with names of columns, t, length_1"),
     "gap in time": (HEAD + ",1,1,1\n", "line 2: t is empty: must be a time in each row"),
     "infinite": (HEAD + "0,1,inf,1\n", 'line 2, column 3: length_2 = "inf": must be a finite number'),
     "negative": (

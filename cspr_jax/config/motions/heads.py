@@ -117,7 +117,7 @@ def is_unit(word: str) -> bool:
 
 def resolved(heads: list[str]) -> list[Head]:
     """Names and units of heads: exact names first, then names of other programs for groups without exact ones."""
-    parts = [_parted(head) for head in heads]
+    parts = [parted(head) for head in heads]
     names = [_exact(stem) for stem, _ in parts]
     for group, letters in (
         ("times", [_time(stem) for stem, _ in parts]),
@@ -146,8 +146,8 @@ def units_within(text: str) -> list[str]:
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]
 
 
-def _parted(head: str) -> tuple[str, str]:
-    # Split a head into its stem, in small letters, and its unit.
+def parted(head: str) -> tuple[str, str]:
+    """Stem of a head, in small letters, and its unit as written, or empty."""
     plain = head.strip().strip("\"'").strip()
     parts = _HEAD.match(plain) if len(plain) <= LONGEST_HEAD else None
     if parts is None:
