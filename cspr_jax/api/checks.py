@@ -36,7 +36,6 @@ from cspr_jax.outputs.limits_touched import TouchedLimit, limits_touched
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.verification.mean_torques import proof_with_means
 from cspr_jax.verification.proved_answers import MotionProof
 from cspr_jax.verification.time_stretching import SLOWEST, least_stretching
 
@@ -156,6 +155,8 @@ class Check(Displayed):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
             plan = self.plan
             scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, NAME, trajectory=plan.keys)
+            from cspr_jax.verification.mean_torques import proof_with_means  # other checks do not need it
+
             minimum = least_stretching(lambda factor: proof_with_means(plan.problem, motion.stretched(factor), scene))
             if not np.isfinite(minimum.factor):
                 return Stretched(np.nan, minimum.is_static, None)

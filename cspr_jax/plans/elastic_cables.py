@@ -29,10 +29,8 @@ OF_ARC = 16  # likewise of an arc
 
 def segment_frequencies(
     problem: Problem, robot_file: RobotFile, frame: Frame, legs: Sequence[JoinedLeg], plan_file: PlanFile, z0: float
-) -> tuple[MotionFrequencies, ...] | None:
-    """Natural frequencies along the segments of a plan; None on cables that do not stretch."""
-    if problem.robot.axial_stiffness is None:
-        return None
+) -> tuple[MotionFrequencies, ...]:
+    """Natural frequencies along the segments of a plan on cables that stretch."""
     ask, frequencies = _asking(problem, robot_file, frame, plan_file), list[MotionFrequencies]()
     for leg in legs:
         for i, motion in enumerate(leg.motions):
@@ -45,11 +43,11 @@ def segment_frequencies(
     return tuple(frequencies)
 
 
-def frequency_warnings(frequencies: Sequence[MotionFrequencies] | None) -> list[str]:
+def frequency_warnings(frequencies: Sequence[MotionFrequencies]) -> list[str]:
     """Lines about segments in which elastic cables may resonate, or in which they do not hold the effector."""
     lines = []
-    for i, segment in enumerate(frequencies or (), start=1):
-        nearest, where = segment.nearest, f"before pose[{i}]: " if len(frequencies or ()) > 1 else ""
+    for i, segment in enumerate(frequencies, start=1):
+        nearest, where = segment.nearest, f"before pose[{i}]: " if len(frequencies) > 1 else ""
         if segment.lowest == 0.0:
             lines.append(f"{where}with these elastic cables the effector is not stable at t = {segment.t:.4g} s")
         elif nearest is not None and nearest.is_near:

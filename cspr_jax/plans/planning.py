@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.machine.motion_frequencies import MotionFrequencies
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import JoinedLeg, LegResult
@@ -25,7 +24,6 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
-from cspr_jax.plans.elastic_cables import frequency_warnings, segment_frequencies
 from cspr_jax.plans.motor_torques import with_mean_torques
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -33,6 +31,9 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
+
+if TYPE_CHECKING:
+    from cspr_jax.machine.motion_frequencies import MotionFrequencies
 
 # Details of segments that hold only if cables run from points, not over pulleys.
 FROM_POINTS = (
@@ -85,7 +86,7 @@ class PlannedMotions:
     warnings: tuple[str, ...] = ()
     text: str = ""
     point: str = "mass-centre"
-    frequencies: tuple[MotionFrequencies, ...] | None = None
+    frequencies: "tuple[MotionFrequencies, ...] | None" = None
 
     @property
     def is_at_origin(self) -> bool:
@@ -182,8 +183,8 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
     legs = with_mean_torques(problem, legs, lambda: _scene(problem, sequence.waypoints))
     why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
-    frequencies = segment_frequencies(problem, robot_file, frame, legs, plan_file, z0)
-    lines = [line for leg in sequence.legs for line in leg.warnings(problem)] + frequency_warnings(frequencies)
+    frequencies, resonances = _frequencies(problem, robot_file, frame, legs, plan_file, z0)
+    lines = [line for leg in sequence.legs for line in leg.warnings(problem)] + resonances
     lines += nearly_resting(sequence.waypoints, z0) + _renumbered(robot_file)
     lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
     return PlannedMotions(
@@ -240,11 +241,32 @@ def with_motions(
     legs = with_mean_torques(plan.problem, [JoinedLeg(plan.keys.family, answers, motions)], lambda: scene)
     answers = legs[0].answers
     why, extremes = _causes(plan.frame, legs), _extremes(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
-    frequencies = segment_frequencies(plan.problem, plan.robot_file, plan.frame, legs, plan.keys, plan.z0)
-    earlier = [line for line in plan.warnings if line not in frequency_warnings(plan.frequencies)]
-    lines = [*earlier, *lines, *frequency_warnings(frequencies), *_missed(plan.keys, answers.feasible, extremes)]
+    frequencies, resonances = _frequencies(plan.problem, plan.robot_file, plan.frame, legs, plan.keys, plan.z0)
+    planned = _frequency_warnings(plan.frequencies)
+    earlier = [line for line in plan.warnings if line not in planned]
+    lines = [*earlier, *lines, *resonances, *_missed(plan.keys, answers.feasible, extremes)]
     changes: dict[str, Any] = {"legs": legs, "demands": extremes, "causes": why, "frequencies": frequencies}
     return dataclasses.replace(plan, warnings=tuple(dict.fromkeys(lines)), **changes)
+
+
+def _frequencies(
+    problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], plan_file: PlanFile, z0: float
+) -> "tuple[tuple[MotionFrequencies, ...] | None, list[str]]":
+    # Natural frequencies along the segments, and lines about them; none on cables that do not stretch.
+    if problem.robot.axial_stiffness is None:
+        return None, []
+    from cspr_jax.plans.elastic_cables import segment_frequencies  # few robots have such cables
+
+    frequencies = segment_frequencies(problem, robot_file, frame, legs, plan_file, z0)
+    return frequencies, _frequency_warnings(frequencies)
+
+
+def _frequency_warnings(frequencies: "tuple[MotionFrequencies, ...] | None") -> list[str]:
+    if frequencies is None:
+        return []
+    from cspr_jax.plans.elastic_cables import frequency_warnings  # nor this
+
+    return frequency_warnings(frequencies)
 
 
 def _causes(frame: Frame, legs: tuple[JoinedLeg, ...]) -> tuple[tuple[Cause, ...], ...]:

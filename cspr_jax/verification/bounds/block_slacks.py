@@ -153,10 +153,13 @@ def _of_rates(
 ) -> list[Part]:
     # Bound the slacks of tensions and limits, those of winches last.
     parts, (cables, matrix, wrench) = list[Part](), balance
+    has_motors = kinds.motors and robot.winches is not None and bool(motor_limits_set(limits))
+    if not (kinds.usual or has_motors):
+        return parts
     tensions = witness_tensions(matrix, wrench, *tension_range(robot, limits))
     if kinds.usual:
         parts += [*_of_tensions(robot, limits, tensions), *limit_slacks(limits, state, cables)]
-    if kinds.motors and robot.winches is not None and motor_limits_set(limits):
+    if has_motors:
         parts += _of_motors(robot, limits, balance, tensions)
     return parts
 
