@@ -19,6 +19,7 @@ from cspr_jax.machine.forward_kinematics.lengths import checked_lengths
 from cspr_jax.machine.forward_kinematics.solutions import Search, SolvedPoses
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.robots.cables import wrench_units
 from cspr_jax.robots.model.patterns import PATTERNS, Pattern
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
@@ -96,10 +97,8 @@ class ForwardKinematics:
         """
         robot = self._robot
         with double_precision():
-            matrices = np.asarray(geometry.wrench_matrices(robot, *self._inner)).copy()
-        if isinstance(robot, PlatformRobot):
-            radius = np.sqrt((np.asarray(robot.platform_points) ** 2).sum(1).mean())
-            matrices[:, len(PATTERNS[robot.pattern].forces) :] /= radius
+            units = np.asarray(wrench_units(robot))
+            matrices = np.asarray(geometry.wrench_matrices(robot, *self._inner)) / units[:, None]
         singular = np.linalg.svd(np.where(np.isfinite(matrices), matrices, 0.0), compute_uv=False)
         largest = np.where(singular[:, 0] > 0.0, singular[:, 0], 1.0)
         return singular[:, -1] / largest

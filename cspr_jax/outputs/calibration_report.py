@@ -17,6 +17,7 @@ from cspr_jax.machine.calibration.measurements import joined_names
 from cspr_jax.machine.calibration.next_poses import NextPoses
 from cspr_jax.machine.calibration.parameters import Parameter
 from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plan_report import finite
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -31,10 +32,9 @@ MAX_PAIRS, MAX_MISTAKES = 5, 12
 DIGITS = 12
 
 
-def file_points(robot: AnyRobot) -> np.ndarray:
-    """Attachment points as robot files have them."""
-    points = np.asarray(robot.platform_points)  # type: ignore[union-attr]
-    centre = robot.centre_of_mass  # type: ignore[union-attr]
+def file_points(robot: PlatformRobot) -> Float[np.ndarray, "n 3"]:
+    """Attachment points as robot files have them, m."""
+    points, centre = np.asarray(robot.platform_points), robot.centre_of_mass
     return points if centre is None or PATTERNS[robot.pattern].is_jointed else points + np.asarray(centre)
 
 
@@ -62,11 +62,12 @@ def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]
 
 def _nominal(result: Calibrated, robot: AnyRobot, row: Parameter) -> float:
     cable, winches = row.cable or 0, robot.winches
-    if row.group in ("spools", "attachments"):
-        points = np.asarray(robot.base_points) if row.group == "spools" else file_points(robot)
+    if row.group == "spools":
+        return float(robot.base_points[cable]["xyz".index(row.axis)])
+    if row.group == "attachments" and isinstance(robot, PlatformRobot):
         if row.axis == "along":
-            return float(np.linalg.norm(np.asarray(robot.platform_points)[cable]))  # type: ignore[union-attr]
-        return float(points[cable]["xyz".index(row.axis)])
+            return float(np.linalg.norm(robot.platform_points[cable]))
+        return float(file_points(robot)[cable]["xyz".index(row.axis)])
     numbers: dict[str, Any] = {
         "drums": winches and winches.drum_radius,
         "pulleys": robot.pulleys and robot.pulleys.radius,
@@ -168,7 +169,7 @@ def _tracker(result: Calibrated) -> dict[str, Any] | None:
     if all(row.group != "tracker" for row in result.parameters.rows):
         return None
     setup, frame = result.estimate.setup, result.frame
-    quaternion = frame.rotated_quaternions(np.asarray(setup.turn))
+    quaternion = frame.rotated_quaternions(np.asarray(setup.orientation))
     vector = np.concatenate([[0.0], np.asarray(frame.origin)])[None]
     conjugate = quaternion * [1.0, -1.0, -1.0, -1.0]
     centre = products(products(quaternion[None], vector), conjugate[None])[0, 1:]

@@ -17,7 +17,7 @@ from cspr_jax.numerics.elementary import as_float64, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
-from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.platform import PlatformRobot, platform_radius
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.pulleys import pulleys_of
 from cspr_jax.robots.model.robot import MOVED
@@ -115,7 +115,7 @@ def wrench_units(robot: AnyRobot) -> Float[Array, "dof"]:
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)
-    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    radius = platform_radius(robot)
     return jnp.concatenate([jnp.asarray(forces), jnp.full(robot.dof - len(forces), radius)])
 
 

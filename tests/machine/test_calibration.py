@@ -126,7 +126,7 @@ def test_covariance_is_that_of_monte_carlo(trials):
         errors.append(np.r_[(result.robot.base_points - spools).ravel(), result.offsets - offsets])
     errors = np.array(errors)
     deviations = np.sqrt(np.diagonal(result.covariance))
-    # Five standard deviations of a standard deviation of so many trials.
+    # 3.5 standard deviations of a standard deviation of so many trials, or 5 %.
     spread = max(0.05, 3.5 / np.sqrt(2.0 * trials))
     np.testing.assert_allclose(np.sqrt(np.mean(errors**2, axis=0)), deviations, rtol=spread)
     squares = np.einsum("ij,jk,ik->i", errors, np.linalg.inv(result.covariance), errors)

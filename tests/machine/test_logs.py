@@ -93,7 +93,7 @@ def test_deviation_of_the_delay_is_that_of_many_logs():
     found = [delay.delay_of(times, clean + 0.01 * rng.normal(size=clean.shape), planned, rate, 0.5) for _ in range(60)]
     errors, deviations = np.array([one.value for one in found]) - 0.1, np.array([one.deviation for one in found])
     assert abs(errors.mean()) < 3.0 * errors.std() / np.sqrt(60.0)
-    assert abs(np.median(deviations) / errors.std() - 1.0) < 0.4
+    assert abs(np.median(deviations) / errors.std() - 1.0) < 0.3
 
 
 def test_a_periodic_motion_has_several_delays():
@@ -136,7 +136,8 @@ def test_the_cable_that_disagrees(tmp_path):
     ((start, end),) = table["cables"][5]["slack"]
     assert abs(start - 1.0) < 0.02 and abs(end - 1.4) < 0.02
     assert all(not row["slack"] for row in table["cables"] if row["cable"] != 5)
-    assert table["cables"][5]["tension_shortfall"] > 0.9 * tensions[is_slack].max(initial=0.0) * 0.1
+    expected = np.interp(times[is_slack] - 0.05, rows["t"], rows["tension"][:, 5]).max()
+    assert table["cables"][5]["tension_shortfall"] == pytest.approx(expected, rel=1e-3)
     beyond = cspr_jax.compare_log(tmp_path / "log.csv", spec, tolerance=1e-4)
     assert not beyond.within_tolerance and "beyond the tolerance" in " ".join(beyond.lines())
 

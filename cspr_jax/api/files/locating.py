@@ -49,11 +49,11 @@ class Located:
     def lines(self) -> list[str]:
         """Notes on the poses, beside the table."""
         answers, lines = self.answers, list(self.notes)
-        missed = int((~answers.is_found).sum())
-        if missed and answers.slack is not None:
-            return [*lines, f"{missed} rows have no pose in which all cables are within these lengths"]
-        if missed:
-            words = "no pose has these lengths" if len(answers.is_found) == 1 else f"{missed} rows have no pose"
+        without_pose = int((~answers.is_found).sum())
+        if without_pose and answers.slack is not None:
+            return [*lines, f"{without_pose} rows have no pose in which all cables are within these lengths"]
+        if without_pose:
+            words = "no pose has these lengths" if len(answers.is_found) == 1 else f"{without_pose} rows have no pose"
             lines.append(f"{words}: the nearest is shown, which misses them by up to {answers.residual.max():.3g} m")
         if answers.slack is not None:
             return [*lines, "at equilibrium, of least potential energy; slack cables are longer than their distance"]

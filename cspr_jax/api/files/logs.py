@@ -183,7 +183,7 @@ def _compared(
     cosine = np.minimum(np.abs((orientations * quaternions).sum(1)), 1.0)
     angle = 2.0 * np.arccos(cosine) if search.row.is_body else None
     picked = np.unique(np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(int))
-    tension, is_slack = _slack(read, curves, planned.robot_file.pairs, times - shift)
+    tension, planned_tension, is_slack = _slack(read, curves, planned.robot_file.pairs, times - shift)
     disagreement, longer = _disagreement(search, poses, picked, ~is_slack[rows[picked]].any(1))
     lengthened: list[list[tuple[float, float]]] = [[] for _ in range(robot.n_cables)]
     if longer is not None:
@@ -203,7 +203,7 @@ def _compared(
         disagreement=disagreement,
         n_spare=robot.n_cables - robot.dof,
         tensions=tension,
-        planned_tensions=curves.tensions(times - shift),
+        planned_tensions=planned_tension,
         slack=None if tension is None else [intervals(times, row) for row in is_slack.T],
         lengthened=lengthened,
         tolerance=tolerance,
@@ -245,13 +245,15 @@ def _disagreement(search: Search, poses: Any, picked: np.ndarray, is_taut: np.nd
     return disagreement, longer_rows(null, rest, threshold)
 
 
-def _slack(read: CableLog, curves: PlanCurves, pairs: Any, times: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-    # Measured tensions, of pairs their sums, and whether each cable, or one of a pair, is slack by them.
+def _slack(
+    read: CableLog, curves: PlanCurves, pairs: Any, times: np.ndarray
+) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+    # Measured and planned tensions, of pairs their sums, and whether each cable, or one of a pair, is slack by them.
     tensions, planned = read.tensions, curves.tensions(times)
     if tensions is None:
-        return None, np.zeros(planned.shape, bool)
-    each, planned = tensions[:, :, None], planned[:, :, None]
+        return None, planned, np.zeros(planned.shape, bool)
+    each, planned_each = tensions[:, :, None], planned[:, :, None]
     if pairs is not None and tensions.shape[1] == 2 * planned.shape[1]:
-        each, planned = tensions[:, pairs.cables], curves.tensions_each(times)[:, pairs.cables]
+        each, planned_each = tensions[:, pairs.cables], curves.tensions_each(times)[:, pairs.cables]
     with np.errstate(invalid="ignore"):
-        return each.sum(2), np.any(each <= SLACK * planned, axis=2)
+        return each.sum(2), planned, np.any(each <= SLACK * planned_each, axis=2)

@@ -46,12 +46,10 @@ class Direction(NamedTuple):
     Fields:
         text: what it is, in words.
         vector: (p,) the direction in the axes of the file, its largest entry 1.
-        is_frame: whether it moves all spools as one body.
     """
 
     text: str
     vector: np.ndarray
-    is_frame: bool = False
 
     def to_dict(self, parameters: Parameters) -> dict[str, Any]:
         """Words and numbers."""
@@ -64,10 +62,10 @@ def unseen_directions(
 ) -> tuple[Direction, ...]:
     """All directions along which the measurements do not change."""
     bodies, vectors = list[Direction](), list[np.ndarray]()
-    for text, is_frame, vector in _bodies(parameters, setup):
+    for text, vector in _bodies(parameters, setup):
         unit = vector / np.linalg.norm(vector)
         if np.linalg.norm(unit - null_space.T @ (null_space @ unit)) <= INSIDE:
-            bodies.append(Direction(text, _in_file(parameters, vector), is_frame))
+            bodies.append(Direction(text, _in_file(parameters, vector)))
             vectors.append(unit)
     rest = null_space
     if vectors:
@@ -102,22 +100,22 @@ def terms(parameters: Parameters, vector: Float[np.ndarray, "p"]) -> str:
     return ", ".join(words) + more
 
 
-def _bodies(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, bool, np.ndarray]]:
+def _bodies(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, np.ndarray]]:
     # Motions of all spools, or of all attachment points, and one factor on everything; if they can be written as
     # parameters.
     robot = setup.robot
-    turn = Rotation.from_quat(setup.turn, scalar_first=True).as_matrix()
+    rotation = Rotation.from_quat(setup.orientation, scalar_first=True).as_matrix()
     base = np.asarray(robot.base_points)
     for k, axis in enumerate("xyz"):
         unit, tracker = np.eye(3)[k], np.zeros(TRACKER)
-        tracker[SHIFT] = -turn @ unit
+        tracker[SHIFT] = -rotation @ unit
         text = f"a shift of all spools and poses along {axis} {NOTHING}"
-        yield from _written(parameters, text, True, _of_cables(robot, SPOOL, unit), tracker)
+        yield from _written(parameters, text, _of_cables(robot, SPOOL, unit), tracker)
         tracker = np.zeros(TRACKER)
-        tracker[TURN] = -turn @ unit
+        tracker[TURN] = -rotation @ unit
         level = LEVEL if axis != "z" else ""
         text = f"a turn of all spools and poses about {axis} {NOTHING}{level}"
-        yield from _written(parameters, text, True, _of_cables(robot, SPOOL, np.cross(unit, base)), tracker)
+        yield from _written(parameters, text, _of_cables(robot, SPOOL, np.cross(unit, base)), tracker)
         if not isinstance(robot, PlatformRobot):
             continue
         for word, back, moves, target in (
@@ -132,7 +130,7 @@ def _bodies(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, bool, n
             tracker = np.zeros(TRACKER)
             tracker[TARGET] = target
             text = f"a {word} of the platform, with poses {back} back, {NOTHING}"
-            yield from _written(parameters, text, False, _of_cables(robot, ATTACHMENT, moves), tracker)
+            yield from _written(parameters, text, _of_cables(robot, ATTACHMENT, moves), tracker)
     yield from _scaled(parameters, setup)
 
 
@@ -142,7 +140,7 @@ def _of_cables(robot: Robot, part: slice, moves: np.ndarray) -> np.ndarray:
     return numbers
 
 
-def _scaled(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, bool, np.ndarray]]:
+def _scaled(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, np.ndarray]]:
     robot = setup.robot
     if robot.winches is None:
         return
@@ -156,12 +154,12 @@ def _scaled(parameters: Parameters, setup: Setup) -> Iterator[tuple[str, bool, n
     tracker = np.zeros(TRACKER)
     tracker[TARGET] = setup.target
     text = f"one factor on the robot, its drums and the poses {NOTHING}; measure a distance between two spools"
-    yield from _written(parameters, text, False, numbers, tracker)
+    yield from _written(parameters, text, numbers, tracker)
 
 
 def _written(
-    parameters: Parameters, text: str, is_frame: bool, numbers: np.ndarray, tracker: np.ndarray
-) -> Iterator[tuple[str, bool, np.ndarray]]:
+    parameters: Parameters, text: str, numbers: np.ndarray, tracker: np.ndarray
+) -> Iterator[tuple[str, np.ndarray]]:
     # The motion as a vector of parameters, if it is one. The tracker matters only where it is free.
     count = parameters.count
     free = np.abs(parameters.of_tracker).any(axis=1)
@@ -170,7 +168,7 @@ def _written(
     vector = np.linalg.lstsq(columns, moves, rcond=None)[0]
     norm = np.linalg.norm(moves)
     if np.linalg.norm(vector) > INSIDE * norm and np.linalg.norm(columns @ vector - moves) <= INSIDE * norm:
-        yield text, is_frame, vector
+        yield text, vector
 
 
 def correlations(

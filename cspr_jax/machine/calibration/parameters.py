@@ -100,11 +100,11 @@ class Parameters:
         if robot.pulleys is not None:
             radius = as_float64(robot.pulleys.radius + each[:, PULLEY])
             changes["pulleys"] = dataclasses.replace(robot.pulleys, radius=radius)
-        turn = products(small_turns(tracker[None, TURN]), np.asarray(setup.turn)[None])[0]
+        orientation = products(small_turns(tracker[None, TURN]), np.asarray(setup.orientation)[None])[0]
         return setup._replace(
             robot=dataclasses.replace(robot, **changes),
             offsets=setup.offsets + each[:, OFFSET],
-            turn=turn,
+            orientation=orientation,
             shift=setup.shift + tracker[SHIFT],
             target=setup.target + tracker[TARGET],
         )
@@ -209,8 +209,8 @@ def _of_tracker(robot: AnyRobot, group: str, signs: np.ndarray, length: float) -
     else:
         parts = [(Parameter(group, None, f"shift {'xyz'[k]}", float(signs[k])), SHIFT.start + k, 1.0) for k in axes]
         for k in turns:
-            turn = Parameter(group, None, f"turn {'xyz'[k]}", float(signs[k]), "rad", 1.0 / length)
-            parts.append((turn, TURN.start + k, 1.0 / length))
+            parameter = Parameter(group, None, f"turn {'xyz'[k]}", float(signs[k]), "rad", 1.0 / length)
+            parts.append((parameter, TURN.start + k, 1.0 / length))
     columns = []
     for parameter, index, value in parts:
         column = np.zeros(TRACKER)

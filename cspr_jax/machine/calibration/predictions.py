@@ -58,7 +58,7 @@ def readings_at(setup: Setup, position: Array, quaternion: Array, *, are_angles:
 def tracked(setup: Setup, position: Array, quaternion: Array) -> tuple[Float[Array, "3"], Float[Array, "4"]]:
     """Position and orientation that the tracker sees at a pose."""
     point = position + matrix(quaternion) @ setup.target
-    return matrix(setup.turn) @ point + setup.shift, product(setup.turn, quaternion)
+    return matrix(setup.orientation) @ point + setup.shift, product(setup.orientation, quaternion)
 
 
 @partial(jax.jit, static_argnames=("are_angles",))
@@ -81,7 +81,7 @@ def _linearised(setup: Setup, axes: Array, turns: Array, batch: tuple, *, are_an
         # Steps in numbers that all cables share: each reading depends on the numbers of its own cable alone.
         common, tracker, coordinate = jnp.split(step, [LOCAL, LOCAL + TRACKER])
         current = with_common(setup, common)._replace(
-            turn=with_turn(setup.turn, tracker[TURN], first=False),
+            orientation=with_turn(setup.orientation, tracker[TURN], first=False),
             shift=setup.shift + tracker[SHIFT],
             target=setup.target + tracker[TARGET],
         )

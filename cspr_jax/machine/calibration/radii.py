@@ -34,12 +34,12 @@ def radius_of(covariance: Float[np.ndarray, "3 3"], probability: float, degrees:
     squares, weights = _directions()
     along = squares @ (variances / variances[-1])
 
-    def missed(ratio: float) -> float:
+    def excess(ratio: float) -> float:
         values = ratio**2 / np.maximum(along, np.finfo(float).tiny)
         inside = chdtr(3.0, values) if np.isinf(degrees) else fdtr(3.0, degrees, values / 3.0)
         return float(weights @ inside) - probability
 
     largest = 1.0
-    while missed(largest) < 0.0:
+    while excess(largest) < 0.0:
         largest *= 2.0
-    return float(np.sqrt(variances[-1]) * brentq(missed, 0.0, largest, xtol=1e-12))
+    return float(np.sqrt(variances[-1]) * brentq(excess, 0.0, largest, xtol=1e-12))

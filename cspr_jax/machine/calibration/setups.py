@@ -13,7 +13,7 @@ from cspr_jax.numerics.linear.rotations import product
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
-from cspr_jax.robots.model.platform import PlatformRobot, across_line
+from cspr_jax.robots.model.platform import PlatformRobot, across_line, platform_radius
 
 
 class Setup(NamedTuple):
@@ -22,7 +22,7 @@ class Setup(NamedTuple):
     Fields:
         robot: robot, centred, z down.
         offsets: (n_cables,) lengths minus what readings say, m.
-        turn: (4,) orientation of the robot's axes in the tracker's.
+        orientation: (4,) of the robot's axes in the tracker's.
         shift: (3,) origin of the robot's axes in the tracker's, m.
         target: (3,) point that the tracker follows, from the mass centre or the joint, platform axes, m.
         per_reading: (n_cables,) length over reading at the nominal robot: m, or m/rad.
@@ -30,7 +30,7 @@ class Setup(NamedTuple):
 
     robot: AnyRobot
     offsets: Any
-    turn: Any
+    orientation: Any
     shift: Any
     target: Any
     per_reading: Any
@@ -65,7 +65,7 @@ def coordinates(robot: AnyRobot) -> Float[np.ndarray, "6 d"]:
     for axis in row.forces:
         columns.append(np.eye(6)[axis])
     if isinstance(robot, PlatformRobot):
-        radius = float(np.sqrt(np.mean(np.sum(np.asarray(robot.platform_points) ** 2, axis=1))))
+        radius = float(platform_radius(robot))
         turns = turning_axes(robot)
         columns += [np.concatenate([np.zeros(3), axis / radius]) for axis in turns]
     return np.stack(columns, axis=1)
@@ -80,13 +80,13 @@ def turning_axes(robot: AnyRobot) -> Float[np.ndarray, "r 3"]:
 
 
 def with_turn(quaternion: jax.Array, vector: jax.Array, *, first: bool) -> jax.Array:
-    """A quaternion turned by a small rotation vector, in its own axes (`first`) or in the fixed ones."""
+    """A quaternion rotated by a small rotation vector, rad, in its own axes (`first`) or in the fixed ones."""
     small = jnp.concatenate([jnp.ones(1), 0.5 * vector])
     small = small / jnp.sqrt(jnp.sum(small**2))
     return product(quaternion, small) if first else product(small, quaternion)
 
 
 def small_turns(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 4"]:
-    """Quaternions of small rotation vectors, as `with_turn` takes them."""
+    """Quaternions of small rotation vectors, rad, as `with_turn` takes them."""
     small = np.concatenate([np.ones((len(vectors), 1)), 0.5 * vectors], axis=1)
     return small / np.linalg.norm(small, axis=1, keepdims=True)

@@ -132,11 +132,11 @@ def aligned_tracker(setup: Setup, poses: EffectorPoses, positions: Float[np.ndar
     if np.count_nonzero(seen) < 3:
         error = f"{np.count_nonzero(seen)} poses with positions"
         raise InputError("tracker", None, "must be three or more, to find the axes of a tracker", problem=error)
-    turns = Rotation.from_quat(poses.quaternions[seen], scalar_first=True)
-    inner, outer = poses.positions[seen] + turns.apply(setup.target), np.nan_to_num(positions[seen])
+    rotations = Rotation.from_quat(poses.quaternions[seen], scalar_first=True)
+    inner, outer = poses.positions[seen] + rotations.apply(setup.target), np.nan_to_num(positions[seen])
     centre, outer_centre = inner.mean(0), outer.mean(0)
     spreads = np.linalg.svd(outer - outer_centre, compute_uv=False)
     if not spreads[1] > ON_LINE * spreads[0]:
         raise InputError("tracker", None, "must not be on one line, to find the axes of a tracker", problem="positions")
-    turn = Rotation.align_vectors(outer - outer_centre, inner - centre)[0]
-    return setup._replace(turn=turn.as_quat(scalar_first=True), shift=outer_centre - turn.apply(centre))
+    rotation = Rotation.align_vectors(outer - outer_centre, inner - centre)[0]
+    return setup._replace(orientation=rotation.as_quat(scalar_first=True), shift=outer_centre - rotation.apply(centre))

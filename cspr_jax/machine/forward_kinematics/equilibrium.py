@@ -92,16 +92,16 @@ def _lowest(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple | No
         steps += number
         if np.abs(move).max(initial=0.0) <= 1e-9 * search.size:
             break
-    values, slopes = (np.asarray(x) for x in _local(search.robot, pose, np.zeros(search.robot.dof), search.radius))
+    values, gradients = (np.asarray(x) for x in _local(search.robot, pose, np.zeros(search.robot.dof), search.radius))
     residual = values[1:] - lengths
-    if not np.isfinite(slopes).all() or not residual.max() <= TAUT * search.size:
+    if not np.isfinite(gradients).all() or not residual.max() <= TAUT * search.size:
         return None
     weight = float(search.robot.mass) * float(search.robot.gravity)
-    is_taut, load, tensions = residual >= -TAUT * search.size, weight * slopes[0], np.zeros(len(lengths))
+    is_taut, load, tensions = residual >= -TAUT * search.size, weight * gradients[0], np.zeros(len(lengths))
     if is_taut.any():
-        tensions[is_taut] = nnls(slopes[1:][is_taut].T, load)[0]
-    is_balanced = np.linalg.norm(tensions @ slopes[1:] - load) <= BALANCED * weight
-    is_stable = bool(is_balanced and _is_stable(search, pose, tensions, slopes[1:], weight))
+        tensions[is_taut] = nnls(gradients[1:][is_taut].T, load)[0]
+    is_balanced = np.linalg.norm(tensions @ gradients[1:] - load) <= BALANCED * weight
+    is_stable = bool(is_balanced and _is_stable(search, pose, tensions, gradients[1:], weight))
     return pose, tensions, residual, steps, is_stable
 
 
@@ -111,8 +111,8 @@ def _program(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple[np.
     def local(move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         key = move.tobytes()
         if key not in precomputed:
-            values, slopes = _local(search.robot, pose, move * extent, search.radius)
-            precomputed[key] = np.asarray(values) / extent, np.asarray(slopes)
+            values, gradients = _local(search.robot, pose, move * extent, search.radius)
+            precomputed[key] = np.asarray(values) / extent, np.asarray(gradients)
         return precomputed[key]
 
     slack = {
@@ -132,11 +132,11 @@ def _program(search: Search, lengths: np.ndarray, pose: np.ndarray) -> tuple[np.
     return np.where(is_good, result.x, 0.0) * extent, int(result.nit)
 
 
-def _is_stable(search: Search, pose: np.ndarray, tensions: np.ndarray, slopes: np.ndarray, weight: float) -> bool:
+def _is_stable(search: Search, pose: np.ndarray, tensions: np.ndarray, gradients: np.ndarray, weight: float) -> bool:
     # Curvature of weight times depth minus tensions times lengths, where cables under tension keep their lengths.
     zero = np.zeros(search.robot.dof)
     curvature = np.asarray(_curvature(search.robot, pose, zero, tensions, weight, search.radius))
-    active = slopes[tensions > BALANCED * weight]
+    active = gradients[tensions > BALANCED * weight]
     _, singular, rows = np.linalg.svd(active) if len(active) else (None, np.zeros(0), np.eye(len(zero)))
     free = rows[int((singular > 1e-8).sum()) :]
     if not len(free):

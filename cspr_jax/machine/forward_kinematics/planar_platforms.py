@@ -23,7 +23,7 @@ import numpy as np
 from cspr_jax.numerics.shapes import Float
 
 DEGREE = 3
-# Number of intervals of a turn to begin with, and how often those that stay undecided are halved.
+# Number of intervals of a full rotation to begin with, and how often those that stay undecided are halved.
 INTERVALS, HALVINGS = 16, 22
 # Rounding errors of F, over the sum of the absolute values of its coefficients.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
@@ -163,8 +163,8 @@ def _singular_angles(cables: Cables) -> Float[np.ndarray, "k"]:
     magnitude = abs(across)
     if magnitude == 0.0 or abs(mean) > magnitude * (1.0 + 1e-9):
         return np.zeros(0)
-    turn = np.arccos(np.clip(-mean / magnitude, -1.0, 1.0))
-    return np.array([turn, -turn]) - np.angle(across)
+    half = np.arccos(np.clip(-mean / magnitude, -1.0, 1.0))
+    return np.array([half, -half]) - np.angle(across)
 
 
 def _on_lines(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cspr_jax.machine.forward_kinematics import planar_platforms, spheres
 from cspr_jax.machine.forward_kinematics.least_squares import Fits, fitted
@@ -17,7 +18,7 @@ from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.shapes import Bool, Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
-from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.platform import PlatformRobot, platform_radius
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.workspaces.poses import geometry
 
@@ -90,7 +91,7 @@ class Search:
         self.size, self.radius = float(np.linalg.norm(base - fixed * self.row.is_jointed, axis=1).max()), 1.0
         if isinstance(robot, PlatformRobot):
             self._arms = np.asarray(robot.platform_points)
-            self.radius = float(np.sqrt((self._arms**2).sum(1).mean()))
+            self.radius = float(platform_radius(robot))
         self.size = max(self.size, self.radius * isinstance(robot, PlatformRobot), 1e-9)
         self.is_redundant = robot.n_cables > robot.dof
         usual = np.inf if self.is_redundant else MET * self.size
@@ -153,12 +154,12 @@ class Search:
         quaternions = np.broadcast_to(np.array(IDENTITY), (len(lengths), 2, 4))
         is_found = counts[:, None] > np.arange(2)
         closed = SolvedPoses(positions, quaternions, residuals, is_found, np.zeros(is_found.shape, int), True)
-        missed = np.flatnonzero(counts == 0)
-        if len(missed):  # the nearest pose instead
-            start = positions[missed, 0] + 1e-3 * self.size * centres.normal
-            near = self._fitted(lengths[missed], start, quaternions[missed, 0])
-            positions[missed], residuals[missed] = near.positions[:, None], near.residuals[:, None]
-            is_found[missed, 0] = self._is_solution(near.residuals, near.has_ended)
+        others = np.flatnonzero(counts == 0)
+        if len(others):  # the nearest pose instead
+            start = positions[others, 0] + 1e-3 * self.size * centres.normal
+            near = self._fitted(lengths[others], start, quaternions[others, 0])
+            positions[others], residuals[others] = near.positions[:, None], near.residuals[:, None]
+            is_found[others, 0] = self._is_solution(near.residuals, near.has_ended)
         return closed
 
     def _planar(self, lengths: np.ndarray) -> SolvedPoses:
@@ -176,11 +177,11 @@ class Search:
             is_found = np.abs(residuals).max(1) <= VERIFIED * self.size
         many = _table(len(lengths), index[is_found], positions[is_found], quaternions[is_found], residuals[is_found])
         many = dataclasses.replace(self._distinct(many), is_complete=True)
-        missed = np.flatnonzero(~many.is_found.any(1))
-        if len(missed):  # the nearest pose instead
-            near = self._select_first(self._from_many(lengths[missed]))
+        others = np.flatnonzero(~many.is_found.any(1))
+        if len(others):  # the nearest pose instead
+            near = self._select_first(self._from_many(lengths[others]))
             for name in ("positions", "quaternions", "residuals", "is_found"):
-                getattr(many, name)[missed, 0] = getattr(near, name)[:, 0]
+                getattr(many, name)[others, 0] = getattr(near, name)[:, 0]
         return many
 
     def _fitted(self, lengths: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Fits:
@@ -210,12 +211,12 @@ class Search:
 
     def _starts(self, lengths: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # In each orientation attachment points lie on spheres about spools: so does the platform, about shifted ones.
-        positions = []
-        for quaternion in quaternions:
+        positions, rotations = [], Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+        for rotation in rotations:
             if self.row.is_jointed:
                 positions.append(np.broadcast_to(self._fixed, (len(lengths), 1, 3)))
                 continue
-            centres = spheres.centres_of(self._base - _rotated(quaternion, self._arms), self.row.forces)
+            centres = spheres.centres_of(self._base - self._arms @ rotation.T, self.row.forces)
             feet, squares = spheres.feet_and_squares(centres, self._fixed, lengths)
             # At height 0 steps could not leave the plane of the spools.
             heights = np.sqrt(np.maximum(squares, (0.1 * self.size) ** 2))[:, None, None]
@@ -312,12 +313,6 @@ def _joined(parts: list[SolvedPoses]) -> SolvedPoses:
 
 def _first(poses: SolvedPoses, count: int) -> SolvedPoses:
     return poses.selected(np.broadcast_to(np.arange(count), (len(poses.is_found), count)))
-
-
-def _rotated(quaternion: np.ndarray, points: np.ndarray) -> np.ndarray:
-    scalar, axis = quaternion[0], quaternion[1:]
-    twice = 2.0 * np.cross(axis, points)
-    return points + scalar * twice + np.cross(axis, twice)
 
 
 def _orientations(is_planar: bool, is_body: bool) -> Float[np.ndarray, "k 4"]:

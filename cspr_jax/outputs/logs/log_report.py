@@ -190,8 +190,8 @@ def log_lines(log: ComparedLog) -> list[str]:
         degrees = _peak(log, np.degrees(log.angle_errors))
         rms, largest, at = (_number(degrees[name]) for name in ("rms", "largest", "t"))
         lines.append(f"angle error: {rms}° rms, largest {largest}° at {at} s")
-    missed = int((~log.is_found).sum())
-    lines += [f"{missed} rows have lengths that no pose has"] if missed else []
+    without_pose = int((~log.is_found).sum())
+    lines += [f"{without_pose} rows have lengths that no pose has"] if without_pose else []
     lines += [disagreement_words(log), *_slack_lines(log)]
     if log.tolerance is not None:
         words = "within" if log.within_tolerance else "beyond"

@@ -183,6 +183,11 @@ def platform_robot(  # noqa: PLR0913
     return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, as_float64(centre))
 
 
+def platform_radius(robot: PlatformRobot) -> Float[Array, ""]:
+    """Root mean square of the distances of the attachment points from the mass centre, or from the joint, m."""
+    return jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+
+
 def across_line(robot: PlatformRobot) -> Float[Array, "3 2"]:
     """Two axes of a rod, normal to the line of its attachment points and to each other."""
     offsets = robot.platform_points - robot.platform_points[:1]

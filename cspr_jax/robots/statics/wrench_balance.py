@@ -7,7 +7,7 @@ from jax import Array
 
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.numerics.shapes import Float
-from cspr_jax.robots.model.platform import PlatformRobot, rays, wrench_per_mass
+from cspr_jax.robots.model.platform import PlatformRobot, platform_radius, rays, wrench_per_mass
 from cspr_jax.robots.model.point_mass import cable_units, plane_normal, rest_point
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.model.state import State
@@ -41,7 +41,7 @@ def normalised_determinant(
     check_determined(robot, pulleys=True)
     arms = robot.platform_points @ rotation.T
     units = -cable_units(robot, position[None] + arms)
-    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    radius = platform_radius(robot)
     return solved(jnp.concatenate([units, jnp.cross(arms / radius, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
 
 

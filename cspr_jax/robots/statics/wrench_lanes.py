@@ -15,7 +15,7 @@ from jax import Array
 
 from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, rotated, rotated_back
 from cspr_jax.numerics.shapes import Float
-from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.platform import PlatformRobot, platform_radius
 
 CABLES = 6  # the only number of cables that the formulas of this module are written for
 
@@ -113,7 +113,7 @@ def determinant(cables: CableLanes) -> Float[Array, "..."]:
 def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Float[Array, "..."]:
     """Determinant of J with unit cables, the platform's radius as unit; see `wrench_balance.normalised_determinant`."""
     lengths = [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]
-    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    radius = platform_radius(robot)
     return determinant(cables) / (radius**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
