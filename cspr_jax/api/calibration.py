@@ -52,7 +52,8 @@ class Calibration:
         robot: the calibrated robot, in the axes of the nominal one.
         offsets: (n_cables,) to be added to measured lengths, or to `zero_length` of winches, m.
         names: (p,) names of the parameters, cables counted from 1.
-        covariance: (p, p) of the parameters, m^2, without what cannot be seen.
+        covariance: (p, p) of the parameters, m^2, which along what cannot be seen stay as near the nominal ones as they
+            can.
         noise: standard deviations of the residuals over the given ones, or over the usual ones if none were given; NaN
             if the measurements leave nothing to estimate it from.
         positions: (k, 3) estimated positions of the origin of the platform axes, or of the point mass, m.

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cspr_jax import __version__
 from cspr_jax.config.formats.writing import robot_text, value_text
@@ -16,7 +17,6 @@ from cspr_jax.machine.calibration.elimination import UNSEEN
 from cspr_jax.machine.calibration.measurements import joined_names
 from cspr_jax.machine.calibration.next_poses import NextPoses
 from cspr_jax.machine.calibration.parameters import Parameter
-from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plan_report import finite
 from cspr_jax.robots.cables import AnyRobot
@@ -170,9 +170,7 @@ def _tracker(result: Calibrated) -> dict[str, Any] | None:
         return None
     setup, frame = result.estimate.setup, result.frame
     quaternion = frame.rotated_quaternions(np.asarray(setup.orientation))
-    vector = np.concatenate([[0.0], np.asarray(frame.origin)])[None]
-    conjugate = quaternion * [1.0, -1.0, -1.0, -1.0]
-    centre = products(products(quaternion[None], vector), conjugate[None])[0, 1:]
+    centre = Rotation.from_quat(quaternion, scalar_first=True).apply(np.asarray(frame.origin))
     shift = frame.rotated(np.asarray(setup.shift)) - centre
     return {"quaternion": quaternion.tolist(), "shift": shift.tolist()}
 

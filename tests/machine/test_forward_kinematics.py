@@ -11,6 +11,7 @@ import cspr_jax
 from cspr_jax.errors import InputError
 from cspr_jax.machine.forward_kinematics import solutions
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.linear import lanes
 from cspr_jax.workspaces.poses import geometry
 
 SPOOLS = [[0.3, -0.2, 0.1], [-0.25, -0.1, 0.0], [0.0, 0.3, -0.05]]
@@ -202,6 +203,15 @@ def test_chunks_of_lengths_change_nothing(monkeypatch):
         for first, second in zip(at_once, by_parts, strict=True):
             for name in ("positions", "quaternions", "is_found", "count", "steps", "all_positions", "all_quaternions"):
                 np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_products_of_quaternions_in_lanes_are_those_of_scipy():
+    left, right = np.random.default_rng(33).normal(size=(2, 5, 4))
+    left, right = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (left, right))
+    both = Rotation.from_quat(left, scalar_first=True) * Rotation.from_quat(right, scalar_first=True)
+    quick = np.stack(lanes.product(tuple(left.T), tuple(right.T)), axis=1)
+    signs = np.sign((quick * both.as_quat(scalar_first=True)).sum(1, keepdims=True))
+    np.testing.assert_allclose(quick, signs * both.as_quat(scalar_first=True), atol=1e-15)
 
 
 def test_lengths_in_lanes_are_those_of_single_poses():

@@ -16,7 +16,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.machine.calibration.setups import Setup, small_turns
+from cspr_jax.machine.calibration.setups import Setup, small_rotations
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.shapes import Float
@@ -100,7 +100,7 @@ class Parameters:
         if robot.pulleys is not None:
             radius = as_float64(robot.pulleys.radius + each[:, PULLEY])
             changes["pulleys"] = dataclasses.replace(robot.pulleys, radius=radius)
-        orientation = products(small_turns(tracker[None, TURN]), np.asarray(setup.orientation)[None])[0]
+        orientation = products(small_rotations(tracker[None, TURN]), np.asarray(setup.orientation)[None])[0]
         return setup._replace(
             robot=dataclasses.replace(robot, **changes),
             offsets=setup.offsets + each[:, OFFSET],

@@ -13,7 +13,7 @@ from jax import Array
 
 from cspr_jax.machine.calibration.measurements import Measurements
 from cspr_jax.machine.calibration.parameters import LOCAL, SHIFT, TARGET, TRACKER, TURN, Parameters, with_common
-from cspr_jax.machine.calibration.setups import EffectorPoses, Setup, coordinates, turning_axes, with_turn
+from cspr_jax.machine.calibration.setups import EffectorPoses, Setup, coordinates, turning_axes, with_rotation
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.rotations import conjugate, matrix, product
 from cspr_jax.numerics.shapes import Float
@@ -81,12 +81,12 @@ def _linearised(setup: Setup, axes: Array, turns: Array, batch: tuple, *, are_an
         # Steps in numbers that all cables share: each reading depends on the numbers of its own cable alone.
         common, tracker, coordinate = jnp.split(step, [LOCAL, LOCAL + TRACKER])
         current = with_common(setup, common)._replace(
-            orientation=with_turn(setup.orientation, tracker[TURN], first=False),
+            orientation=with_rotation(setup.orientation, tracker[TURN], first=False),
             shift=setup.shift + tracker[SHIFT],
             target=setup.target + tracker[TARGET],
         )
         move = axes @ coordinate
-        position, quaternion = pose.positions + move[:3], with_turn(pose.quaternions, move[3:], first=True)
+        position, quaternion = pose.positions + move[:3], with_rotation(pose.quaternions, move[3:], first=True)
         readings = (readings_at(current, position, quaternion, are_angles=are_angles) - measured[0]) * setup.per_reading
         point, orientation = tracked(current, position, quaternion)
         difference = product(conjugate(measured[2]), orientation)

@@ -79,14 +79,14 @@ def turning_axes(robot: AnyRobot) -> Float[np.ndarray, "r 3"]:
     return np.asarray(across_line(robot)).T if row.along_line else np.eye(3)[list(row.moments)]
 
 
-def with_turn(quaternion: jax.Array, vector: jax.Array, *, first: bool) -> jax.Array:
+def with_rotation(quaternion: jax.Array, vector: jax.Array, *, first: bool) -> jax.Array:
     """A quaternion rotated by a small rotation vector, rad, in its own axes (`first`) or in the fixed ones."""
     small = jnp.concatenate([jnp.ones(1), 0.5 * vector])
     small = small / jnp.sqrt(jnp.sum(small**2))
     return product(quaternion, small) if first else product(small, quaternion)
 
 
-def small_turns(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 4"]:
-    """Quaternions of small rotation vectors, rad, as `with_turn` takes them."""
+def small_rotations(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 4"]:
+    """Quaternions of small rotation vectors, rad, as `with_rotation` takes them."""
     small = np.concatenate([np.ones((len(vectors), 1)), 0.5 * vectors], axis=1)
     return small / np.linalg.norm(small, axis=1, keepdims=True)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.errors import InputError
 from cspr_jax.machine.calibration.predictions import Predictor
-from cspr_jax.machine.calibration.setups import EffectorPoses, Setup, small_turns
+from cspr_jax.machine.calibration.setups import EffectorPoses, Setup, small_rotations
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.shapes import Float
@@ -37,7 +37,7 @@ ON_LINE = 1e-6
 def moved_poses(poses: EffectorPoses, axes: Float[np.ndarray, "6 d"], steps: Float[np.ndarray, "k d"]) -> EffectorPoses:
     """Poses after steps of their coordinates."""
     moves = steps @ axes.T
-    return EffectorPoses(poses.positions + moves[:, :3], products(poses.quaternions, small_turns(moves[:, 3:])))
+    return EffectorPoses(poses.positions + moves[:, :3], products(poses.quaternions, small_rotations(moves[:, 3:])))
 
 
 def starting_poses(

@@ -229,13 +229,6 @@ def _rotated(quaternion: Vector, vector: Vector) -> Float[Array, "4 k"]:
     angle = jnp.sqrt(jnp.where(square > 0.0, square, 1.0))
     sine = jnp.where(square > 1e-12, jnp.sin(0.5 * angle) / angle, 0.5)
     scalar = jnp.where(square > 1e-12, jnp.cos(0.5 * angle), 1.0 - square / 8.0)
-    x, y, z = (sine * part for part in vector)
-    a, b, c, d = quaternion
-    rotated = (
-        scalar * a - x * b - y * c - z * d,
-        scalar * b + x * a + y * d - z * c,
-        scalar * c + y * a + z * b - x * d,
-        scalar * d + z * a + x * c - y * b,
-    )
+    rotated = lanes.product((scalar, *(sine * part for part in vector)), quaternion)
     norm = jnp.sqrt(sum(part * part for part in rotated))
     return jnp.stack([part / norm for part in rotated])

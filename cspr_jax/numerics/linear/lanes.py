@@ -50,6 +50,18 @@ def rotation_matrix(quaternion: Sequence[Array]) -> Matrix:
     )
 
 
+def product(left: Sequence[Array], right: Sequence[Array]) -> tuple[Array, ...]:
+    """The product of two quaternions, of which the right one rotates first; see `numerics.linear.rotations.product`."""
+    a, b, c, d = left
+    w, x, y, z = right
+    return (
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y + c * w + d * x - b * z,
+        a * z + d * w + b * y - c * x,
+    )
+
+
 def about_axis(axis: Vector, sine: Float[Array, "..."], cosine: Float[Array, "..."]) -> Matrix:
     """The matrix of a rotation about an axis, by Rodrigues' formula."""
     x, y, z = axis
