@@ -203,7 +203,16 @@ def figures(monkeypatch):
 @pytest.fixture
 def small_bench(monkeypatch):
     """Sizes with which `cspr bench` takes seconds."""
-    from cspr_jax.bench import ellipses, motions, paths, six_cables, three_cables, timing, workspaces
+    from cspr_jax.bench import (
+        ellipses,
+        forward_kinematics,
+        motions,
+        paths,
+        six_cables,
+        three_cables,
+        timing,
+        workspaces,
+    )
 
     monkeypatch.setattr(timing, "REPEATS", 1)
     monkeypatch.setattr(timing, "SIDE", 8)
@@ -216,4 +225,5 @@ def small_bench(monkeypatch):
     monkeypatch.setattr(six_cables, "LANES", 64)
     monkeypatch.setattr(motions, "rates", lambda: {"3 cables, 10001 rows": 12.0})
     monkeypatch.setattr(paths, "rates", lambda: {"3 cables": 500.0})
+    monkeypatch.setattr(forward_kinematics, "rates", lambda: {"3 cables": 1e6})
     monkeypatch.setattr(workspaces, "rates", lambda: {"8 cables": {"float32": 2e6, "float64": 1e6, "first_s": 1.0}})

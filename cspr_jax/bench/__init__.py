@@ -7,7 +7,17 @@ from typing import Any
 
 import jax
 
-from cspr_jax.bench import ellipses, hand_written, motions, paths, six_cables, three_cables, timing, workspaces
+from cspr_jax.bench import (
+    ellipses,
+    forward_kinematics,
+    hand_written,
+    motions,
+    paths,
+    six_cables,
+    three_cables,
+    timing,
+    workspaces,
+)
 from cspr_jax.numerics.batches import device_batch_size
 
 SCHEMA = 1
@@ -37,6 +47,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         "ellipses": ellipses.rates(),
         "motions": motions.rates(),
         "paths": paths.rates(),
+        "forward_kinematics": forward_kinematics.rates(),
         "ratio_to_numpy": _ratios(rates, {name: row["numpy"] for name, row in rates.items()}),
         "ratio_to_hand_written": None if written is None else _ratios(rates, written),
         "cores": timing.cores(),
@@ -68,6 +79,7 @@ def lines(report: dict[str, Any]) -> list[str]:
             text.append(f"  {dtype:8s} {rate / 1e6:8.2f} M/s{words}")
     text += workspaces.lines(report["workspaces"]) + ellipses.lines(report["ellipses"])
     text += motions.lines(report["motions"]) + paths.lines(report["paths"])
+    text += forward_kinematics.lines(report["forward_kinematics"])
     if report["operations_per_check"] is None or not report["device"].startswith("cpu"):
         return text
     for dtype in ("float32", "float64"):

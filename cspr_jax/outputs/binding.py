@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.motion.limits import other_limits
+from cspr_jax.motion.limits import motor_limits_set, other_limits
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.winches import motor_demands
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.criteria import pose_conditions
@@ -61,6 +66,21 @@ def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray])
     for row in other_limits(limits):
         limit = np.asarray(getattr(limits, row.name), float)
         rows.append((row.flag, (limit - values[row.quantity]) / (radius if row.unit == "m" else limit)))
+    rows += _of_motors(problem, of_cables)
     if pose_conditions(robot)[1]:
         rows.append((Verdict.ABOVE_SPOOLS, (state.position @ np.asarray(plane_normal(robot)))[:, None] / radius))
     return rows
+
+
+def _of_motors(problem: Problem, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
+    # Slacks of limits of winches over these limits, with the tensions of the rows.
+    winches, limits = problem.robot.winches, motor_limits_set(problem.limits)
+    if winches is None or not limits:
+        return []
+    with double_precision():
+        motion = tuple(jnp.asarray(of_cables[name]) for name in ("length", "rate", "rate_derivative"))
+        demands = jax.vmap(partial(motor_demands, winches))(motion, jnp.asarray(of_cables["tension"]))
+    return [
+        (row.flag, 1.0 - np.asarray(getattr(demands, row.quantity)) / np.asarray(getattr(problem.limits, row.name)))
+        for row in limits
+    ]

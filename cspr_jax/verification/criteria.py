@@ -22,7 +22,7 @@ import numpy as np
 
 from cspr_jax.motion.limits import allowance, limits_set, motor_limits_set
 from cspr_jax.numerics.tolerances import TOUCHED
-from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.cables import BOUNDING, AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import contact_pairs, default_scene
 from cspr_jax.robots.model.limits import Limits
@@ -148,7 +148,7 @@ def _motor_criteria(robot: AnyRobot, limits: Limits, row: Limit) -> list[Criteri
 
 def bounds_tensions(row: Limit) -> bool:
     """Tell whether a limit of winches bounds tensions."""
-    return row.quantity != "motor_speed"
+    return row.name in BOUNDING
 
 
 def levels(rows: Sequence[Criterion]) -> np.ndarray:

@@ -10,7 +10,7 @@ from oracles import point_mass
 from outputs.test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
-from cspr_jax.bench import ellipses, motions, paths, six_cables, three_cables, timing, workspaces
+from cspr_jax.bench import ellipses, forward_kinematics, motions, paths, six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.families.ellipses import harmonics
@@ -45,6 +45,7 @@ def test_bench(capsys, small_bench, kernels):
     text = cspr(capsys, "bench", *options)
     assert "x NumPy" in text and "proofs of motions a second" in text
     assert "least times along paths a second\n  3 cables " in text
+    assert "poses from lengths of cables a second\n  3 cables " in text
 
 
 @pytest.fixture
@@ -67,6 +68,15 @@ def test_rates_of_workspaces(few_poses):
     found = workspaces.rates()
     assert len(found) == 8 and all(x > 0 for row in found.values() for x in row.values())
     assert len(workspaces.lines(found)) == 9 and "first" in workspaces.lines(found)[1]
+
+
+def test_the_rate_of_poses_from_lengths(monkeypatch):
+    """Poses are those of the lengths, else it is no rate."""
+    monkeypatch.setattr(timing, "REPEATS", 1)
+    assert forward_kinematics.rate(motions.THREE, 64) > 0.0
+    monkeypatch.setattr(forward_kinematics, "CLOSE", 0.0)
+    with pytest.raises(SelfCheckError, match="a pose of the bench is not that of its lengths"):
+        forward_kinematics.rate(motions.THREE, 64)
 
 
 @pytest.mark.thorough

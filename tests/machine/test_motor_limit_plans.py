@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.mean_torques import mean_torques
 
 WINCH = {"drum_radius": 0.02, "gear_ratio": 3.0, "friction": 0.005, "efficiency": 0.9, "motor_inertia": 1e-5}
@@ -89,3 +90,16 @@ def test_retimed_plans_keep_the_root_mean_square():
     planned, kept = retimed(float(0.3 * after + 0.7 * before))
     assert planned.feasible and kept.feasible and not kept.answers.is_retimed.all()
     assert any("motor_torque_rms_max" in line for line in kept.warnings)
+
+
+def test_motors_bind_rows_of_motion_files(torques):
+    """Where the limit of torque is nearest, its motor is named; it is exceeded where NumPy says so."""
+    limit = 0.9 * float(np.abs(torques[1]).max())
+    rows = _segment(motor_torque_max=limit)[0].rows(4000.0)
+    assert len(rows["binding"]) == len(torques[0])
+    over = np.abs(torques[1]) > limit * (1.0 + BESIDE)
+    named = rows["binding"] == Verdict.MOTOR_OVER_TORQUE
+    inside = slice(2, -2)  # ends, where NumPy's differences are one-sided
+    assert over[inside].any() and named[inside][over[inside].any(1)].all()
+    assert (_segment(motor_torque_max=1e3 * limit)[0].rows(100.0)["binding"] == Verdict.SLACK_CABLE).any()
+    np.testing.assert_array_equal(rows["binding_cable"][named], (np.abs(torques[1]).argmax(1) + 1)[named])

@@ -7,7 +7,7 @@ from pydantic import Field, create_model, model_validator
 from cspr_jax.config.keys.limits import NotNegativePerCable, PerCable, one_or_each
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
-from cspr_jax.robots.model.winch_numbers import LINE, LOAD, TOGETHER, WINCH_LIMITS, WINCH_NUMBERS
+from cspr_jax.robots.model.winch_numbers import LINE, LOAD, WINCH_LIMITS, WINCH_NUMBERS, missing_number
 from cspr_jax.schema.limits import LIMITS
 
 _Sign = Annotated[float, Field(ge=-1, le=1)]
@@ -42,13 +42,8 @@ class WinchTable(_Numbers):
             values = value if isinstance(value, list) else [] if value is None else [value]
             if not all(map(row.is_allowed, values)):
                 raise table_error(row.name, value, f"{row.allowed}, or one per cable")
-        for pair in TOGETHER:
-            names = [name for name in pair if getattr(self, name) is not None]
-            if len(names) == 1:
-                missing = next(name for name in pair if name not in names)
-                raise table_error(missing, None, f"given beside {names[0]}")
-        if getattr(self, LOAD) is not None and getattr(self, LINE) is None:
-            raise table_error(LINE, None, f"given beside {LOAD}")
+        if missing := missing_number([row.name for row in ROWS if getattr(self, row.name) is not None]):
+            raise table_error(missing[0], None, f"given beside {missing[1]}")
         return self
 
     def check_count(self, count: int) -> None:

@@ -1,6 +1,7 @@
 """Numbers of winches: one row each. No jax here: files use them too."""
 
 import dataclasses
+from collections.abc import Collection
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,3 +83,9 @@ WINCH_LIMITS = tuple(
 )
 # Line, and the limit that it sets to 1 where no other value is given.
 LINE, LOAD = TOGETHER[1][0], "motor_load_max"
+
+
+def missing_number(names: Collection[str]) -> tuple[str, str] | None:
+    """A number that must be given beside another one that is; None: none is missing."""
+    pairs = [*TOGETHER, *((other, number) for number, other in TOGETHER), (LOAD, LINE)]
+    return next(((other, number) for number, other in pairs if number in names and other not in names), None)

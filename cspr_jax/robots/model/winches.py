@@ -30,7 +30,7 @@ from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.robots.model.winch_numbers import LINE, LOAD, TOGETHER, WINCH_LIMITS, WINCH_NUMBERS, WinchNumber
+from cspr_jax.robots.model.winch_numbers import LINE, LOAD, WINCH_LIMITS, WINCH_NUMBERS, WinchNumber, missing_number
 
 # A motor whose speed is below this one, in rad/s, stands still: friction may act in either direction.
 STANDSTILL = 1e-6
@@ -97,10 +97,8 @@ def winches_of(values: Mapping[str, Any], n_cables: int, cable_diameter: Any, at
     numbers: dict[str, Any] = {
         row.name: value for row in WINCH_NUMBERS if (value := _number(row, values, n_cables, at)) is not None
     }
-    for pair in TOGETHER:
-        if len(numbers.keys() & set(pair)) == 1:
-            missing, other = sorted(pair, key=lambda name: name in numbers)
-            raise InputError(f"{at}{missing}", None, f"given beside {other}", problem="missing")
+    if missing := missing_number([name for name, value in values.items() if value is not None]):
+        raise InputError(f"{at}{missing[0]}", None, f"given beside {missing[1]}", problem="missing")
     turns, length = numbers.pop("layer_turns", None), numbers.pop("cable_length", None)
     layers = None
     if turns is not None and length is not None:
@@ -117,8 +115,6 @@ def winch_limits(values: Mapping[str, Any], n_cables: int, at: str = "") -> dict
     numbers = {row.name: value for row in WINCH_LIMITS if (value := _number(row, values, n_cables, at)) is not None}
     if values.get(LINE) is not None:
         return {LOAD: as_float64(np.ones(n_cables))} | numbers
-    if LOAD in numbers:
-        raise InputError(f"{at}{LINE}", None, f"given beside {LOAD}", problem="missing")
     return numbers
 
 

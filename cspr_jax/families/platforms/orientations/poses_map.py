@@ -18,7 +18,7 @@ from cspr_jax.families.platforms.motion_checker import MANY
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, batch_bounds
 from cspr_jax.families.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.maps.grid_map import PlatformMap
-from cspr_jax.motion.limits import has_motor_limits, without_motors
+from cspr_jax.motion.limits import has_motor_limits
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.statics.reference_pose import reference_pose
 from cspr_jax.schema.quantities import TILT_TORSION
@@ -42,7 +42,11 @@ class PosesMap(PlatformMap):
         from_rest = start is None or start.rest
         self._scene = self._scene_or_none(robot_file)
         self._is_verified = self._scene is not None or has_motor_limits(self._problem.limits)
-        plain = self._problem._replace(limits=without_motors(self._problem.limits))
+        plain = self._problem
+        if self._is_verified:
+            from cspr_jax.verification.verifier import of_family  # maps without these need no general proof
+
+            plain = of_family(plain)
         self._checker = pose_checker(plain, motion_kind(spec.trajectory, from_rest=from_rest), batch=MANY)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
