@@ -78,9 +78,11 @@ def _of_motors(problem: Problem, of_cables: Mapping[str, np.ndarray]) -> list[tu
     if winches is None or not limits:
         return []
     with double_precision():
-        motion = tuple(jnp.asarray(of_cables[name]) for name in ("length", "rate", "rate_derivative"))
-        demands = jax.vmap(partial(motor_demands, winches))(motion, jnp.asarray(of_cables["tension"]))
+        length, rate, second_derivative, tension = (
+            jnp.asarray(of_cables[name]) for name in ("length", "rate", "rate_derivative", "tension")
+        )
+        values = jax.vmap(partial(motor_demands, winches))((length, rate, second_derivative), tension)
     return [
-        (row.flag, 1.0 - np.asarray(getattr(demands, row.quantity)) / np.asarray(getattr(problem.limits, row.name)))
+        (row.flag, 1.0 - np.asarray(getattr(values, row.quantity)) / np.asarray(getattr(problem.limits, row.name)))
         for row in limits
     ]

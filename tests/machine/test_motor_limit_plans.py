@@ -102,4 +102,5 @@ def test_motors_bind_rows_of_motion_files(torques):
     inside = slice(2, -2)  # ends, where NumPy's differences are one-sided
     assert over[inside].any() and named[inside][over[inside].any(1)].all()
     assert (_segment(motor_torque_max=1e3 * limit)[0].rows(100.0)["binding"] == Verdict.SLACK_CABLE).any()
-    np.testing.assert_array_equal(rows["binding_cable"][named], (np.abs(torques[1]).argmax(1) + 1)[named])
+    worst = np.abs(torques[1]).argmax(1) + 1
+    np.testing.assert_array_equal(rows["binding_cable"][inside][named[inside]], worst[inside][named[inside]])
