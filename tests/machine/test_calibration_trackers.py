@@ -33,14 +33,16 @@ def test_covariance_beside_a_tracker_is_that_of_constrained_least_squares():
     assert np.sqrt(np.diagonal(result.covariance)[[2, 5, 8]]).max() < 1e-3 * np.sqrt(result.covariance.max())
 
 
-@pytest.mark.thorough
-def test_covariance_beside_a_tracker_is_that_of_monte_carlo():
+@pytest.mark.parametrize(
+    "trials", [pytest.param(40, marks=pytest.mark.thorough), pytest.param(400, marks=pytest.mark.soak)]
+)
+def test_covariance_beside_a_tracker_is_that_of_monte_carlo(trials):
     rng = np.random.default_rng(5)
-    results = [tracked_prism(rng) for _ in range(200)]
+    results = [tracked_prism(rng) for _ in range(trials)]
     found = np.array([np.r_[np.asarray(one.robot.base_points).ravel(), one.offsets] for one in results])
     level = np.delete(np.arange(12), [2, 5, 8])
     deviations = np.sqrt(np.diagonal(results[0].covariance))[level]
-    np.testing.assert_allclose(found[:, level].std(0, ddof=1), deviations, rtol=4.0 / np.sqrt(2.0 * 200))
+    np.testing.assert_allclose(found[:, level].std(0, ddof=1), deviations, rtol=4.0 / np.sqrt(2.0 * trials))
 
 
 def test_steps_toward_the_nominal_robot():

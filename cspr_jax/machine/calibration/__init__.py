@@ -5,9 +5,9 @@ too. With the whitened residuals r and their derivatives J by the parameters and
 U^T, the part of the left singular vectors of B that B does not reach, free the problem of the pose: U^T r + U^T J d is
 least. The stacked rows of all poses are one small matrix, whose singular values decide what the measurements tell: its
 inverse is the covariance, its null space what they cannot see. Along the null space the estimate stays as close to the
-nominal robot as it can (free network adjustment). Mistakes among the measurements are found by residuals over their
-standard deviation, which the redundancy of each measurement gives (Baarda, A Testing Procedure for Use in Geodetic
-Networks, 1968), while a robust loss keeps them from hiding each other.
+nominal robot as it can (free network adjustment), and its covariance is that of such estimates. Mistakes among the
+measurements are found by residuals over their standard deviation, which the redundancy of each measurement gives
+(Baarda, A Testing Procedure for Use in Geodetic Networks, 1968), while a robust loss keeps them from hiding each other.
 
 Files, each importing only from those above it:
 
