@@ -1,7 +1,11 @@
 """Stops of random plans by an oracle apart: continuity, rest, and tensions at many samples; broken cables; mistakes."""
 
+import dataclasses
 import itertools
 import json
+import subprocess
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +14,11 @@ from support.commands import cspr, strict_json
 
 import cspr_jax
 from cspr_jax.machine.stops import braking, dying_swings, free_stops
-from cspr_jax.machine.stops.instants import StateSamples
+from cspr_jax.machine.stops.fastest import begins_with
+from cspr_jax.machine.stops.instants import RESTING, StateSamples
 from cspr_jax.motion.motion import states_at
 from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.plots.motions.stops import stops_figure
 
 SPOOLS = {
     "2": [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
@@ -61,9 +67,9 @@ def check_stop(plan, stop, robot, broken=False, samples=400):
         states = [np.asarray(part) for part in states_at(stop.motion, np.linspace(0.0, 1.0, samples))[:3]]
     weight, duration = robot.mass * robot.gravity, float(stop.motion.duration())
     start = state_of_plan(plan, stop.time)
-    for order, (mine, theirs) in enumerate(zip(states, start, strict=True)):
-        if not (broken and (order == 2 or stop.kind == "rest")) and stop.kind != "rest":
-            np.testing.assert_allclose(mine[0], theirs, atol=SAME * 10.0**order)
+    # After a break the acceleration may jump; a robot that rests already stays where it is.
+    for order, (mine, theirs) in enumerate(zip(states[: 2 if broken else 3], start, strict=False)):
+        np.testing.assert_allclose(mine[0], theirs, atol=SAME * 10.0**order)
     # Velocities and accelerations are the derivatives of the positions.
     if stop.kind != "rest":
         assert stop.duration == pytest.approx(duration)
@@ -107,6 +113,22 @@ def test_too_few_cables_say_what_is_left(planar):
     assert not found.all_found and found.lines() == [found.left] and "swings below one spool" in found.left
     assert found.to_dict()["none_found"] == [[found.times[0], found.times[1]]] and found.to_dict()["longest"] is None
     assert all(stop.to_dict()["kind"] is None for stop in found.stops)
+
+
+def test_pictures_show_a_plane_or_both_views(planar):
+    """A robot in space that moves in the plane y = 0 is drawn from above too."""
+    robot = {"name": "s", "mass": MASS, "base_points": SPOOLS["3"]}
+    pose = [{"position": [x, 0.0, 1.2], "time": time} for x, time in ((0.0, 0.0), (0.1, 2.0))]
+    spatial = cspr_jax.plan({"schema": 1, "family": "spline", "robot": robot, "pose": pose})
+    for plan, labels in ((planar, {"z (m)"}), (spatial, {"y (m)", "z (m)"})):
+        panels = stops_figure(cspr_jax.stops(plan, instants=1, without=[0])).axes
+        assert {panel.get_ylabel() for panel in panels} == labels | {"time to rest (s)"}
+
+
+def test_stops_load_no_pictures():
+    code = "import sys, cspr_jax; cspr_jax.stops, cspr_jax.size; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
 
 
 def _states(rng, turning=False):
@@ -183,6 +205,56 @@ def test_brakes_stay_on_the_path_and_begin_with_its_state():
         np.testing.assert_allclose(np.hypot(*rates[25]), 0.4, atol=1e-3)
         slowing = pulls[25] @ rates[25] / np.hypot(*rates[25])
         np.testing.assert_allclose(slowing, -0.8 * 1.875 / one.duration, rtol=1e-2)
+
+
+def test_the_motion_itself_goes_on_to_its_next_rest():
+    """From two instants to rest in a line, all states asked for at once."""
+    asked = []
+
+    def states_at_times(times):
+        asked.append(len(times))
+        zero = np.zeros_like(times)
+        columns = [np.stack([part, zero, zero], axis=1) for part in (np.cos(times), -np.sin(times), -np.cos(times))]
+        return StateSamples(times, columns[0] + [0.0, 0.0, 1.5], *columns[1:])
+
+    instants = states_at_times(np.array([0.5, 4.0, 6.0]))
+    found = braking.rests_ahead(states_at_times, instants, np.array([0.0, np.pi, 5.0]), 1.5, 9.81)
+    assert [one.sample for one in found] == [0, 1] and len(asked) == 2
+    for one, (start, end) in zip(found, ((0.5, np.pi), (4.0, 5.0)), strict=True):
+        assert one.duration == pytest.approx(end - start)
+        with double_precision():
+            states = states_at(one.motion, np.linspace(0.0, 1.0, 7))
+        expected = states_at_times(np.linspace(start, end, 7))
+        np.testing.assert_allclose(states.position, expected.position, atol=1e-9)
+        np.testing.assert_allclose(states.acceleration, expected.acceleration, atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [1e-2, 1.0, 1e2])
+def test_rest_does_not_depend_on_the_size_of_the_robot(size):
+    """Speeds in units of sqrt(g r), angular ones of sqrt(g / r), accelerations of g and g / r."""
+    speed, gravity, unit = np.sqrt(9.81 * size), 9.81, np.ones((1, 3))
+    for moved in range(4):
+        for factor, expected in ((0.5, True), (2.0, False)):
+            level = RESTING * np.where(np.arange(4) == moved, factor, 0.0)
+            rates = (level[0] * speed, level[1] * gravity, level[2] * speed / size, level[3] * gravity / size)
+            velocity, acceleration, omega, alpha = (rate * unit for rate in rates)
+            start = np.array([[1.0, 0.0, 0.0, 0.0]])
+            samples = StateSamples(np.zeros(1), 0.0 * unit, velocity, acceleration, start, omega, alpha)
+            assert samples.rests(size, gravity).tolist() == [expected]
+            assert samples.is_still(size, gravity).tolist() == [expected or moved in (1, 3)]
+
+
+def test_a_stop_begins_with_the_orientation_of_its_instant():
+    instants = _states(np.random.default_rng(8), True)
+    motion = free_stops.short_stops(instants, 1.5, 9.81, jumps=False)[-1].motion
+    robot = cspr_jax.point_mass(SPOOLS["3"], mass=MASS)
+    emergency = SimpleNamespace(problem=SimpleNamespace(robot=robot), jumps=False)
+    turned = instants.quaternion[:, [1, 0, 3, 2]] * [-1.0, 1.0, 1.0, -1.0]
+    with double_precision():
+        for quaternion, expected in ((1.0, True), (-2.0, True), (None, False)):
+            start = turned if quaternion is None else quaternion * instants.quaternion
+            one = dataclasses.replace(instants, quaternion=start)
+            assert begins_with(one, 0, motion, emergency) is expected
 
 
 @pytest.mark.parametrize("turning", [False, True])
@@ -290,6 +362,7 @@ def test_no_stop_is_later_than_that_of_a_second_optimiser(kind, capsys):
     found, ratios = cspr_jax.stops(plan, times=times), []
     for stop in found.stops:
         other = least_stop(hanging(kind), *state_of_plan(plan, stop.time))
+        assert np.isfinite(other) and stop.is_found
         ratios.append(stop.duration / other)
     with capsys.disabled():
         print(f"\n{kind}: duration over the other's {np.round(ratios, 4).tolist()}")

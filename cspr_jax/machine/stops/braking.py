@@ -48,15 +48,19 @@ def rests_ahead(
     states_at: StatesAt, samples: StateSamples, resting: Float[np.ndarray, "n"], z0: float, gravity: float
 ) -> list[Candidate]:
     """The motions themselves, up to the next time at which they rest."""
-    half, candidates = np.pi * np.sqrt(z0 / gravity), []
+    spacing, grids = SPACING * np.pi * np.sqrt(z0 / gravity), dict[int, np.ndarray]()
     for k, time in enumerate(samples.times.tolist()):
         later = resting[resting > time]
-        if not len(later):
-            continue
-        count = max(KNOTS, int(np.ceil((later[0] - time) / (SPACING * half))) + 1)
-        times = np.linspace(time, later[0], count)
-        ones = np.ones(count)
-        candidates.append(_along(k, states_at(times), times - time, ones, 0.0 * ones, z0))
+        if len(later):
+            count = max(KNOTS, int(np.ceil((later[0] - time) / spacing)) + 1)
+            grids[k] = np.linspace(time, later[0], count)
+    if not grids:
+        return []
+    states, ends = states_at(np.concatenate(list(grids.values()))), np.cumsum([len(times) for times in grids.values()])
+    candidates = []
+    for (k, times), end in zip(grids.items(), ends.tolist(), strict=True):
+        ones, part = np.ones(len(times)), states.take(np.arange(end - len(times), end))
+        candidates.append(_along(k, part, times - times[0], ones, 0.0 * ones, z0))
     return candidates
 
 

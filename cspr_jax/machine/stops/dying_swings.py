@@ -17,7 +17,7 @@ from cspr_jax.numerics.linear.rotations import products
 HALVES = (1, 2, 3, 4, 6, 8, 12, 16, 24)  # half swings until the amplitude is 0
 DEPTHS = (1.0, 0.8, 1.25)  # depths of P0, over that of the robot at the instant
 KNOTS = 16  # per half swing, and one more
-NEAR = 1e-6  # smallest depth over z0 of a robot that can swing
+NEAR = 1e-6  # smallest depth below the spools of a robot that can swing, m
 
 
 def dying_swings(samples: StateSamples, gravity: float, *, jumps: bool) -> list[Candidate]:
@@ -67,7 +67,8 @@ def _vanishing(times: np.ndarray, acceleration: np.ndarray, within: float) -> li
 
 
 def _level(samples: StateSamples, k: int, times: np.ndarray) -> list[np.ndarray] | None:
-    # Quaternions (1, v) q0, of any norm, that turn by a quintic v to the reference orientation.
+    # Quaternions (1, v) q0, of any norm, that turn by a quintic v to the reference orientation, or, where it is more
+    # than 120 degrees away, towards it: v would grow without bound.
     if samples.quaternion is None or samples.angular_velocity is None or samples.angular_acceleration is None:
         return None
     q0 = samples.quaternion[k]

@@ -17,7 +17,7 @@ from cspr_jax.machine.stops.braking import StatesAt, brakes, rests_ahead
 from cspr_jax.machine.stops.candidates import Candidate, ProvedStop, fastest_proved, hermite_spline, proved
 from cspr_jax.machine.stops.dying_swings import dying_swings
 from cspr_jax.machine.stops.free_stops import free_stops, short_stops
-from cspr_jax.machine.stops.instants import RESTING, StateSamples, instants_of
+from cspr_jax.machine.stops.instants import StateSamples, instants_of
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
@@ -32,6 +32,7 @@ JOINED = 1e-6
 # Largest tensions of searches for robots that have none, over their weight: without one, the least time is that of
 # impulses.
 LARGEST_TENSION = 2.0
+CHUNK = 500  # number of instants whose candidates are held at once
 
 
 class Emergency(NamedTuple):
@@ -81,7 +82,7 @@ class ConsecutiveMotions(NamedTuple):
     def resting(self, problem: Problem) -> Float[np.ndarray, "m"]:
         """Times between and after the motions at which the robot rests."""
         ends = np.concatenate([[0.0], np.cumsum(self.durations)])
-        before = instants_of(self.motions, self.durations, np.maximum(ends, 0.0))
+        before = instants_of(self.motions, self.durations, ends)
         return ends[before.rests(float(spool_radius(problem.robot)), float(problem.robot.gravity))]
 
 
@@ -89,6 +90,13 @@ def fastest_stops(
     emergency: Emergency, sequence: ConsecutiveMotions, times: Float[np.ndarray, "k"]
 ) -> list[ProvedStop | None]:
     """The fastest stop from each of k times, None where none is found; all are proved."""
+    chunks = [times[i : i + CHUNK] for i in range(0, len(times), CHUNK)]
+    return [stop for chunk in chunks for stop in _fastest_stops(emergency, sequence, chunk)]
+
+
+def _fastest_stops(
+    emergency: Emergency, sequence: ConsecutiveMotions, times: Float[np.ndarray, "k"]
+) -> list[ProvedStop | None]:
     problem, scene, z0, gravity = (
         emergency.problem,
         emergency.scene,
@@ -142,9 +150,7 @@ def _resting(emergency: Emergency, samples: StateSamples) -> list[ProvedStop | N
     # A robot at rest may stay if that is proved; after a break, it may also lose its acceleration at once.
     problem = emergency.problem
     radius, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
-    is_still = samples.rests(radius, gravity)
-    if emergency.jumps:
-        is_still = np.abs(samples.rates).max(1) <= RESTING * np.sqrt(gravity * radius)
+    is_still = samples.is_still(radius, gravity) if emergency.jumps else samples.rests(radius, gravity)
     answers: list[ProvedStop | None] = [None] * len(samples)
     rows = np.flatnonzero(is_still).tolist()
     motions = [_constant(samples, k, emergency.z0) for k in rows]
@@ -190,7 +196,13 @@ def begins_with(samples: StateSamples, k: int, motion: Spline, emergency: Emerge
     speed = np.sqrt(gravity * radius)
     pairs = [(state.position, samples.position[k], radius), (state.velocity, samples.velocity[k], speed)]
     pairs += [] if emergency.jumps else [(state.acceleration, samples.acceleration[k], gravity)]
-    if samples.angular_velocity is not None and samples.angular_acceleration is not None:
+    if (
+        samples.quaternion is not None
+        and samples.angular_velocity is not None
+        and samples.angular_acceleration is not None
+    ):
+        start = samples.quaternion[k] / np.linalg.norm(samples.quaternion[k])
+        pairs.append((state.quaternion * np.copysign(1.0, state.quaternion @ start), start, 1.0))
         pairs.append((state.angular_velocity, samples.angular_velocity[k], speed / radius))
         turning = (
             [] if emergency.jumps else [(state.angular_acceleration, samples.angular_acceleration[k], gravity / radius)]

@@ -16,7 +16,8 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.state import State
 
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
-# Speeds and accelerations below these fractions of sqrt(g r) and g count as rest, with the radius r of the robot.
+# Speeds and accelerations below this fraction of sqrt(g r) and g count as rest, with the radius r of the robot; angular
+# ones, times r, likewise.
 RESTING = 1e-9
 
 
@@ -64,10 +65,14 @@ class StateSamples:
     def _joined(self, linear: np.ndarray, angular: np.ndarray | None) -> np.ndarray:
         return linear if angular is None else np.concatenate([linear, angular], axis=1)
 
+    def is_still(self, radius: float, gravity: float) -> np.ndarray:
+        """Tell at which instants the robot has no velocity, (k,)."""
+        return _are_small(self.velocity, self.angular_velocity, np.sqrt(gravity * radius), radius)
+
     def rests(self, radius: float, gravity: float) -> np.ndarray:
         """Tell at which instants the robot is at rest, (k,)."""
-        slow = np.abs(self.rates).max(1) <= RESTING * np.sqrt(gravity * radius)
-        return slow & (np.abs(self.accelerations).max(1) <= RESTING * gravity)
+        forceless = _are_small(self.acceleration, self.angular_acceleration, gravity, radius)
+        return self.is_still(radius, gravity) & forceless
 
     def moved(self, before: Frame, after: Frame, references: Sequence[np.ndarray]) -> StateSamples:
         """The same states in the axes of another robot with the same file's axes.
@@ -80,6 +85,12 @@ class StateSamples:
             between = products(references[0][None], (references[1] * BACK)[None])
             changes["quaternion"] = products(self.quaternion, between)
         return dataclasses.replace(self, **{name: np.asarray(value) for name, value in changes.items()})
+
+
+def _are_small(linear: np.ndarray, angular: np.ndarray | None, unit: float, radius: float) -> np.ndarray:
+    # Angular rates have the unit over the radius.
+    scaled = linear if angular is None else np.concatenate([linear, radius * angular], axis=1)
+    return np.abs(scaled).max(1) <= RESTING * unit
 
 
 def instants_of(

@@ -10,9 +10,8 @@ from cspr_jax.motion.motion import states_at
 from cspr_jax.outputs.plots.style.fitting import legend_above
 from cspr_jax.outputs.plots.style.labels import COLOURS
 from cspr_jax.outputs.stop_report import KINDS, PlannedStop, StopsAlong
+from cspr_jax.robots.model.patterns import PATTERNS
 
-# A path is planar if its extent along y is at most this fraction of that along x: typed numbers are rounded.
-ONE_PLANE = 1e-9
 SAMPLES = 60  # of a path of a stop
 POINTS = 2000  # of the path of the plan
 SHOWN = 60  # largest number of stops whose paths are drawn: more would hide each other
@@ -23,7 +22,7 @@ NONE_COLOUR = "#b00000"
 def stops_figure(answer: StopsAlong) -> Figure:
     """Paths of plan and stops, and durations."""
     path = _path(answer)
-    is_planar = np.ptp(path[:, 1]) <= ONE_PLANE * np.ptp(path[:, 0])
+    is_planar = PATTERNS[answer.plan.problem.robot.pattern].is_planar
     views = {"xz": 2} if is_planar else {"xy": 1, "xz": 2}
     rows: list[Any] = [[*views] * (2 // len(views)), ["duration"] * 2]
     figure = Figure(figsize=(9.0, 7.2), layout="constrained")
