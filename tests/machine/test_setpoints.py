@@ -8,12 +8,14 @@ import yaml
 from oracles import any_motion
 from oracles.sampled_motion import State
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.setpoints.formats import LINES
-from cspr_jax.schema.setpoints import SETPOINT_FORMATS
+from cspr_jax.outputs.setpoints import formats
+from cspr_jax.outputs.setpoints.formats import LINES, points_of
+from cspr_jax.schema.setpoints import LARGEST_RATE, SETPOINT_FORMATS
 from cspr_jax.store.reading.setpoints import read_set_points
 
 WINCH = {
@@ -32,7 +34,7 @@ CORNERS = [[1.0, 1.0, 2.0], [-1.0, 1.0, 2.0], [-1.0, -1.0, 2.2], [1.0, -1.0, 2.0
 
 
 def _winches(n):
-    drums = {"drum_radius": [0.02 + 0.005 * k for k in range(n)], "direction": [1.0, -1.0, 1.0, -1.0][:n]}
+    drums = {"drum_radius": [0.02 + 0.005 * k for k in range(n)], "direction": [(-1.0) ** k for k in range(n)]}
     return WINCH | drums | {"layer_turns": 7.5, "cable_length": 9.0}
 
 
@@ -140,6 +142,61 @@ def test_files_read_back_give_the_poses_of_the_plan(tmp_path, plans, kind, endin
     np.testing.assert_allclose(rows["position"][[35, 65, 100]], _way(kind)[1][1:4], atol=1e-9)
 
 
+# A platform hangs on six cables in three near pairs.
+RING = [
+    [0.0, 0.86, 0.02],
+    [0.0, 0.84, 0.01],
+    [-0.71, -0.4, -0.02],
+    [-0.78, -0.45, 0.0],
+    [0.68, -0.44, -0.04],
+    [0.72, -0.45, -0.01],
+]
+PLATE = [
+    [0.154, 0.097, -0.001],
+    [-0.136, 0.08, 0.004],
+    [-0.141, 0.087, -0.007],
+    [-0.009, -0.178, 0.002],
+    [-0.01, -0.175, -0.002],
+    [0.155, 0.089, 0.004],
+]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("pulley_radius", [None, 0.03])
+def test_files_read_back_give_the_poses_of_a_platform(tmp_path, pulley_radius):
+    """Positions and orientations that least squares find for the lengths on the drums."""
+    robot = {"base_points": RING, "platform_points": PLATE, "centre_of_mass": [0.01, -0.02, 0.03]}
+    keys = robot | {"inertia": (0.01 * np.eye(3)).tolist(), "z_axis": "down", "tension_min": 0.05}
+    keys |= {"pulley_radius": pulley_radius} if pulley_radius else {}
+    path = _robot(tmp_path, "platform", **keys)
+    if pulley_radius:
+        robot |= {"pulley_radius": np.full(6, pulley_radius), "pulley_axes": np.array([[0.0, 0.0, -1.0]] * 6)}
+    times, points = _way("platform")
+    turns = Rotation.from_rotvec([[0, 0, 0], [0.1, 0, 0.05], [0, 0.12, 0], [0.05, -0.05, 0.1], [0, 0, 0]])
+    quaternions = turns.as_quat(scalar_first=True)
+    points = [0.4, 0.4, 1.0] * points + [0.0, 0.0, 0.3]
+    plan = cspr_jax.check(path, times, points, quaternions, interpolation="quintic").plan
+    rows, winch = plan.rows(50.0), _winches(6)
+    angles = read_set_points(plan.save_setpoints(tmp_path / "points.csv", 50.0))["angle"]
+
+    def lengths(x):
+        rotation = Rotation.from_rotvec(x[3:]).as_matrix()[None]
+        state = State(x[None, :3], *np.zeros((2, 1, 3)), rotation, *np.zeros((2, 1, 3)))
+        return any_motion.cables(robot, state).lengths[0]
+
+    # Rows count orientations from one that the package chooses, the motion and the lengths from that of the file.
+    relative = Rotation.from_quat(rows["quaternion"], scalar_first=True)
+    absolute = relative * relative[0].inv() * turns[0]
+    assert (absolute[[35, 65, 100]] * turns[1:4].inv()).magnitude().max() < 1e-9
+    for i in (0, 17, 64, 100, len(rows["t"]) - 1):
+        wanted = np.array([_of_angle(winch, k, angle)[1] for k, angle in enumerate(angles[i])])
+        turn = absolute[i]
+        start = np.concatenate([rows["position"][i], turn.as_rotvec()]) + 0.01
+        found = least_squares(lambda x, wanted=wanted: lengths(x) - wanted, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+        np.testing.assert_allclose(found[:3], rows["position"][i], atol=1e-9)
+        assert (Rotation.from_rotvec(found[3:]) * turn.inv()).magnitude() < 1e-9
+
+
 def _friction_side(speed):
     return np.where(np.abs(speed) > 1e-6, np.sign(speed), 0.0)
 
@@ -225,13 +282,19 @@ def test_robots_without_winches_have_lengths_and_tensions(tmp_path):
     assert not (tmp_path / "points.txt").exists()
 
 
-def test_rates_are_bounded(plans):
-    for rate, words in ((2e6, "at most 1e"), (1e6, None), (0.5, None)):
-        if words is None:
-            assert len(plans["space"].setpoints(rate).t) == 3 if rate < 1.0 else True
-            continue
-        with pytest.raises(ConfigError, match=words):
-            plans["space"].setpoints(rate)
+def test_rates_are_bounded(plans, monkeypatch):
+    np.testing.assert_array_equal(plans["space"].setpoints(0.5).t, [0.0, 2.0, 2.603])
+    for rate in (0.0, np.nextafter(LARGEST_RATE, np.inf)):
+        with pytest.raises(ConfigError, match=r"--rate: .*: must be a number > 0, at most 1e\+06, in Hz"):
+            points_of(plans["space"], rate)
+    monkeypatch.setattr(formats, "LARGEST_NUMBERS", 395)
+    # 131 instants on ticks and the end, of 3 axes each.
+    assert len(plans["space"].setpoints(50.0).t) == 132
+    with pytest.raises(ConfigError, match="--rate: 52 Hz: must give at most 131 set points of 3 axes"):
+        plans["space"].setpoints(52.0)
+
+
+def test_every_format_is_written_and_read():
     assert set(SETPOINT_FORMATS) == set(LINES)
 
 
@@ -272,7 +335,17 @@ def test_nothing_is_written_for_motions_that_are_not_proved(tmp_path):
         ("a.json", "{", "no JSON"),
         ("a.yaml", "a: [", "no YAML"),
         ("a.json", '{"points": []}', "must be a JointTrajectory"),
+        (
+            "a.json",
+            '{"joint_names": ["winch_1"], "points": [{"time_from_start": {"sec": "1", "nanosec": 0}}]}',
+            "must be a J",
+        ),
+        ("a.json", '{"joint_names": ["winch_1"], "points": [{"time_from_start": {"sec": 1}}]}', "must be a JointTraj"),
         ("a.txt", "t\n1\n", "the first line must be # cycle time"),
+        ("a.txt", "# cycle time x s\ncount_1\n1\n", "the first line must be # cycle time, a number > 0, s"),
+        ("a.txt", "# cycle time 1.2.3 s\ncount_1\n1\n", "the first line must be # cycle time"),
+        ("a.txt", "# cycle time 0 s\ncount_1\n1\n", "the first line must be # cycle time"),
+        ("a.csv", "t,angle_1\n0,nan\n", "must hold only finite numbers"),
         ("a.xml", "", "must end in"),
     ],
 )

@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.setpoints import MOTOR, NANO, SETPOINT_FORMATS
 
 _HEAD = re.compile(r"^([a-z_]+?)_([1-9]\d{0,3})$")
-_CYCLE = re.compile(r"^# cycle time (\S+) s$")
+_CYCLE = re.compile(r"^# cycle time (\d[\d.e+-]*) s$")
 # Names of the arrays of joints: of motors, and of cables.
 _OF_JOINTS = {
     "positions": ("angle", "length"),
@@ -30,10 +30,14 @@ def read_set_points(path: Path) -> dict[str, np.ndarray]:
         raise ConfigError(path, f"must end in {' or '.join(SETPOINT_FORMATS)}")
     text = read_text(path)
     if path.suffix == ".csv":
-        return _columns(path, csv.reader(text.splitlines()))
-    if path.suffix == ".txt":
-        return _cycles(path, text)
-    return _joints(path, _parsed(path, text))
+        points = _columns(path, csv.reader(text.splitlines()))
+    elif path.suffix == ".txt":
+        points = _cycles(path, text)
+    else:
+        points = _joints(path, _parsed(path, text))
+    if not all(np.isfinite(array).all() for array in points.values()):
+        raise ConfigError(path, "must hold only finite numbers")
+    return points
 
 
 def _columns(path: Path, rows: Iterable[list[str]]) -> dict[str, np.ndarray]:
@@ -55,10 +59,15 @@ def _columns(path: Path, rows: Iterable[list[str]]) -> dict[str, np.ndarray]:
 
 def _cycles(path: Path, text: str) -> dict[str, np.ndarray]:
     first, *rows = text.splitlines() or [""]
-    if not (match := _CYCLE.match(first)):
-        raise ConfigError(path, f"{shown(first)}: the first line must be # cycle time, a number, s")
+    try:
+        match = _CYCLE.match(first)
+        cycle = float(match[1]) if match else 0.0
+    except ValueError:
+        cycle = 0.0
+    if not cycle > 0.0:
+        raise ConfigError(path, f"{shown(first)}: the first line must be # cycle time, a number > 0, s")
     columns = _columns(path, (row.split("\t") for row in rows))
-    return {"t": np.arange(len(rows) - 1) * float(match[1]), **columns}
+    return {"t": np.arange(len(rows) - 1) * cycle, **columns}
 
 
 def _parsed(path: Path, text: str) -> Any:
@@ -76,18 +85,24 @@ def _parsed(path: Path, text: str) -> Any:
         raise ConfigError(path, f"no YAML: {' '.join(str(error).split())}") from None
 
 
+def _seconds(sec: Any, nanosec: Any) -> float:
+    # Words would be multiplied as well.
+    if not isinstance(sec, int) or not isinstance(nanosec, int):
+        raise TypeError
+    return (sec * NANO + nanosec) / NANO
+
+
 def _joints(path: Path, message: Any) -> dict[str, np.ndarray]:
     try:
         names, points = message["joint_names"], message["points"]
         is_cable = not str(names[0]).startswith(MOTOR)
-        stamps = [point["time_from_start"] for point in points]
-        times = np.array([(stamp["sec"] * NANO + stamp["nanosec"]) / NANO for stamp in stamps], float)
+        times = np.array([_seconds(**point["time_from_start"]) for point in points])
         arrays = {
             quantities[is_cable]: np.array([point[name] for point in points], float)
             for name, quantities in _OF_JOINTS.items()
             if points and name in points[0]
         }
-    except (KeyError, TypeError, IndexError, ValueError):
+    except (KeyError, TypeError, IndexError, ValueError, OverflowError):
         raise ConfigError(path, "must be a JointTrajectory: joint_names, and points with time_from_start") from None
     if any(array.shape != (len(points), len(names)) for array in arrays.values()):
         raise ConfigError(path, f"points must hold {len(names)} numbers each: one a joint")
