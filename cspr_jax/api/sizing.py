@@ -25,7 +25,6 @@ from cspr_jax.machine.sizing import MotionDemands, holding_demands, joint_cycle,
 from cspr_jax.motion.motion import Motion
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.machine.sizing_report import WITH_FACTOR, size_object, size_table, worst
-from cspr_jax.outputs.plots.selection import result_at
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -186,6 +185,7 @@ def _source(item: Any, k: int) -> _Motions | _StaticPoses:
     if hasattr(item, "axes"):
         return _workspace(item, f"result {k + 1}")
     if isinstance(item, str | Path) and Path(item).suffix != ".toml":
+        from cspr_jax.outputs.plots.selection import result_at  # loads matplotlib
         from cspr_jax.store.reading.result import open_result  # plans load no results
 
         return _workspace(open_result(result_at(Path(item))), str(item))

@@ -6,9 +6,7 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.files.pictured import Pictured
@@ -22,7 +20,9 @@ from cspr_jax.outputs.mujoco import replay as replays
 from cspr_jax.outputs.mujoco.elastic_replay import ElasticPlan
 from cspr_jax.outputs.mujoco.module import need_mujoco
 from cspr_jax.outputs.mujoco.motion import STEP
-from cspr_jax.outputs.plots.films.replay import replay_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PlanOrFile = Annotated[
     str | Path | Mapping[str, Any] | Plan,
@@ -36,6 +36,8 @@ class Replay(Pictured, replays.PlayedPlan):
     """A plan, and its motion as played by MuJoCo; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
 
     def _figure(self) -> Figure:
+        from cspr_jax.outputs.plots.films.replay import replay_figure  # loads matplotlib
+
         return replay_figure(self)
 
 
