@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.families.paths.least_time.least_time import LeastTime
-from cspr_jax.families.paths.least_time.refusals import NoMotion
-from cspr_jax.families.paths.least_time.static_tension import StaticTension
+from cspr_jax.families.paths.least_time.refusals import NoMotion, StaticTension
 from cspr_jax.families.paths.least_time.tightening import BindingName
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.cause import Cause

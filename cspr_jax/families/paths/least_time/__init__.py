@@ -2,6 +2,7 @@
 
 Files, each importing only from those above it:
 
+    motor_bounds       tensions with which motors keep their limits, near a motion
     constraints        half-planes of path acceleration and squared path speed
     nodes              nodes of sections, and half-planes at both sides of them
     controllable       path speeds from which the end can be reached; the fastest motion on a grid
@@ -14,7 +15,6 @@ Files, each importing only from those above it:
     timed              motions in time from path speeds
     tightening         limits that a motion breaks between nodes, and criteria that bind it
     jumping            the fastest motions of many sections, with jumps of acceleration
-    static_tension     tension that prevents a robot from being at rest
-    refusals           the point that no path speed can pass, and names of half-planes there
+    refusals           the point that no path speed can pass, names of half-planes there, and tensions that prevent rest
     least_time         the fastest motion along a section
 """

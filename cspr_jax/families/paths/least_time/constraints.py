@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.families.paths.least_time.motor_bounds import LinearBounds, MotorTensions, Reference, motor_tensions
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
@@ -91,9 +92,12 @@ def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
     return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, momentum_rate, rest)
 
 
-def path_half_planes(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> HalfPlanes:
-    """Half-planes at one point."""
-    parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
+def path_half_planes(
+    robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""], reference: Reference | None = None
+) -> HalfPlanes:
+    """Half-planes at one point; with a reference, those of motors come last."""
+    wrenches = unit_wrenches(robot, state)
+    parts = [_of_tensions(robot, limits, wrenches)]
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
     _, rate, acceleration = cable_motion(robot, state)
     if limits.cable_acceleration_max is not None:
@@ -104,6 +108,10 @@ def path_half_planes(robot: AnyRobot, limits: Limits, state: State, speed: Float
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if limits.acceleration_max is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
+    if reference is not None:
+        motors = motor_tensions(robot, limits, state, reference)
+        of_motors = _of_motors if robot.n_cables == robot.dof else _of_motors_together
+        parts.append(of_motors(robot, limits, wrenches, motors, reference))
     u, x, bounds, margin_loss = (jnp.concatenate(column) for column in zip(*parts, strict=True))
     return HalfPlanes(u, x, bounds, margin_loss, cap)
 
@@ -142,6 +150,67 @@ def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tup
     # Replace a face without a bound by 0 <= 1.
     momentum, momentum_rate, margin_loss = (jnp.where(bounds, x, 0.0) for x in (-momentum, -momentum_rate, margin_loss))
     return momentum, momentum_rate, jnp.where(bounds, maximum, 1.0), margin_loss
+
+
+def _linear_tensions(wrenches: UnitWrenches) -> LinearBounds:
+    # Tensions that balance a wrench that is linear in u and x.
+    inverse = right_inverse(wrenches.matrix)
+    return LinearBounds(inverse @ wrenches.momentum, inverse @ wrenches.momentum_rate, inverse @ wrenches.rest)
+
+
+def _of_motors(
+    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, _: Reference
+) -> tuple[Array, ...]:
+    # Make two half-planes for each limit, side of friction and cable, over the weight: of largest, then of smallest
+    # tensions.
+    tension, weight = _linear_tensions(wrenches), robot.mass * robot.gravity
+    both = [
+        LinearBounds(*(sign * (side - own) for own, side in zip(tension, bound, strict=True)))
+        for sign, bound in ((1.0, motors.high), (-1.0, motors.low))
+    ]
+    slack = LinearBounds(*(jnp.stack(parts).ravel() / weight for parts in zip(*both, strict=True)))
+    loss = jnp.stack([motors.width] * 2).ravel() / weight
+    has_bound = jnp.isfinite(slack.constant)
+    u, x, loss = (jnp.where(has_bound, part, 0.0) for part in (-slack.u, -slack.x, loss))
+    return u, x, jnp.where(has_bound, slack.constant, 1.0), loss
+
+
+def _of_motors_together(
+    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, reference: Reference
+) -> tuple[Array, ...]:
+    # Make one half-plane for each face of the set of wrenches whose tensions lie within the narrowest of all bounds.
+    weight, tension = robot.mass * robot.gravity, _linear_tensions(wrenches)
+    static_low, static_high = (jnp.broadcast_to(jnp.asarray(x), robot.n_cables) for x in tension_range(robot, limits))
+    low, high = (
+        _narrowest(motors.low, static_low, reference, -1.0),
+        _narrowest(motors.high, static_high, reference, 1.0),
+    )
+    along = tension_faces(robot, limits, wrenches.matrix).along
+    ups, downs = jnp.maximum(along, 0.0), jnp.minimum(along, 0.0)
+    has_bound = (along != 0.0).any(1) & ~(((downs != 0.0) & ~jnp.isfinite(high.constant)).any(1))
+    high = high._replace(constant=jnp.where(jnp.isfinite(high.constant), high.constant, 0.0))
+    slack = LinearBounds(
+        *(
+            jnp.sum(along * own[None] - ups * least[None] - downs * most[None], axis=1) / weight
+            for own, least, most in zip(tension, low, high, strict=True)
+        )
+    )
+    loss = jnp.sum(jnp.abs(along), axis=1) / weight
+    u, x, loss = (jnp.where(has_bound, part, 0.0) for part in (-slack.u, -slack.x, loss))
+    return u, x, jnp.where(has_bound, slack.constant, 1.0), loss
+
+
+def _narrowest(bounds: LinearBounds, static: Array, reference: Reference, sign: float) -> LinearBounds:
+    # The bound of each cable that is narrowest at the reference; sign 1 for largest, -1 for smallest tensions.
+    count, none = bounds.u.shape[-1], jnp.zeros((1, bounds.u.shape[-1]))
+    every = LinearBounds(
+        *(
+            jnp.concatenate([more, part.reshape(-1, count)])
+            for more, part in zip((none, none, static[None]), bounds, strict=True)
+        )
+    )
+    nearest = jnp.argmin(sign * every.at(reference), axis=0, keepdims=True)
+    return LinearBounds(*(jnp.take_along_axis(part, nearest, axis=0)[0] for part in every))
 
 
 def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:

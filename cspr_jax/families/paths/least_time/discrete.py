@@ -12,10 +12,11 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section, SectionSettings
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes, face_count
 from cspr_jax.families.paths.least_time.multipliers import SideHalfPlanes
-from cspr_jax.families.paths.least_time.nodes import PathGrid, grid_of, side_half_planes
+from cspr_jax.families.paths.least_time.nodes import PathGrid, PathSpeeds, grid_of, side_half_planes
 from cspr_jax.families.paths.least_time.smooth import NodeHalfPlanes
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.shapes import Bool, Float
+from cspr_jax.robots.cables import AnyRobot
 
 # Path speeds are at most this multiple of that of a fall along the path.
 FASTER = 1e2
@@ -50,7 +51,7 @@ class Discrete:
         grid: nodes, and limits of speeds.
         start: half-planes at the starts of the cells, (n_cells, n_rows).
         end: half-planes at the ends of the cells.
-        n_faces: number of half-planes that bound tensions.
+        is_tension: (n_rows,) whether half-planes bound tensions; margins of others are fractions of their limits.
         ends: x at the start and at the end of the section.
         largest: upper bound of all x.
     """
@@ -59,7 +60,7 @@ class Discrete:
     grid: PathGrid
     start: HalfPlanes
     end: HalfPlanes
-    n_faces: int
+    is_tension: np.ndarray
     ends: tuple[float, float]
     largest: float
 
@@ -76,10 +77,9 @@ class Discrete:
     def with_margins(self, margins: GridMargins) -> "Discrete":
         """The same section with tighter half-planes and caps."""
         nodes = margins.at_nodes()
-        is_tension = np.arange(self.start.bound.shape[1]) < self.n_faces
 
         def tighter(half_planes: HalfPlanes, part: slice) -> HalfPlanes:
-            lost = np.where(is_tension, nodes.tension[part, None], nodes.acceleration[part, None])
+            lost = np.where(self.is_tension, nodes.tension[part, None], nodes.acceleration[part, None])
             return half_planes._replace(
                 bound=half_planes.bound - half_planes.margin_loss * lost,
                 cap=half_planes.cap * (1.0 - nodes.speed[part]) ** 2,
@@ -116,22 +116,35 @@ class Discrete:
         )
 
 
-def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings]) -> list[Discrete]:
-    """Sections on their grids."""
+def discretes(
+    problem: Problem,
+    sections: Sequence[Section],
+    settings: Sequence[SectionSettings],
+    references: Sequence[PathSpeeds | None] | None = None,
+) -> list[Discrete]:
+    """Sections on their grids, with references with limits of motors near these."""
     robot = problem.robot
     speed_max = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
     grids = [
         grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), speed_max)
         for section, each in zip(sections, settings, strict=True)
     ]
-    sides = side_half_planes(robot, problem.limits, [section.curve for section in sections], grids)
+    near = references or [None] * len(sections)
+    sides = side_half_planes(robot, problem.limits, [section.curve for section in sections], grids, near)
+    is_tension = _of_tensions(robot, sides[0][0].bound.shape[1], near[0] is not None)
     paths = []
     for section, each, grid, (start, end) in zip(sections, settings, grids, sides, strict=True):
         speeds = zip((each.start_speed, each.end_speed), _steepness(section.curve), strict=True)
         first, last = ((speed / steepness) ** 2 if speed else 0.0 for speed, steepness in speeds)
         largest = FASTER**2 * float(robot.gravity) * float(section.curve.knots[-1])
-        paths.append(Discrete(section, grid, start, end, face_count(robot), (first, last), largest))
+        paths.append(Discrete(section, grid, start, end, is_tension, (first, last), largest))
     return paths
+
+
+def _of_tensions(robot: AnyRobot, n_rows: int, has_motors: bool) -> Bool[np.ndarray, "n_rows"]:
+    # Tell which half-planes bound tensions: the first ones and, of motors of redundant cables, the last ones.
+    count, number = face_count(robot), np.arange(n_rows)
+    return (number < count) | (has_motors & (robot.n_cables > robot.dof) & (number >= n_rows - count))
 
 
 def _steepness(curve: Spline) -> tuple[float, float]:

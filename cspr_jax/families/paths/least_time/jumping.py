@@ -11,7 +11,8 @@ import numpy as np
 
 from cspr_jax.families.paths.least_time.controllable import GridSolution, fastest, minmod_rates
 from cspr_jax.families.paths.least_time.discrete import Discrete
-from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
+from cspr_jax.families.paths.least_time.nodes import PathSpeeds
+from cspr_jax.families.paths.least_time.timed import moving
 from cspr_jax.numerics.batches import device_batch_size, padded
 from cspr_jax.numerics.shapes import Float
 

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Generator, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,12 @@ from cspr_jax.families.paths.least_time.bound import path_bound
 from cspr_jax.families.paths.least_time.controllable import GridSolution
 from cspr_jax.families.paths.least_time.discrete import FASTER, Discrete, discretes
 from cspr_jax.families.paths.least_time.jumping import Jumping, PathAccelerations, again, jumping_motions
+from cspr_jax.families.paths.least_time.nodes import PathSpeeds
 from cspr_jax.families.paths.least_time.refusals import NoMotion, refusal
 from cspr_jax.families.paths.least_time.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.families.paths.least_time.tightening import BindingName, CellSlacks, Trial, together
-from cspr_jax.families.paths.least_time.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
-from cspr_jax.motion.limits import are_of_motors
+from cspr_jax.families.paths.least_time.timed import cell_times, distance_from_path, moving, timed
+from cspr_jax.motion.limits import are_of_motors, motor_limits_set
 from cspr_jax.motion.problem import Problem, bounding_problem, search_problem
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.runtime.progress import RateEstimate
@@ -31,6 +32,9 @@ SLOW = 0.01
 FINER = (2, 4)  # factors of finer grids, for motions without a proof or without a close lower bound
 FAR = 0.002  # a lower bound is close if it is below the duration by at most this fraction
 STARTS = (0.8, 0.4)  # the search with ramps starts from these fractions of x of the motion without ramps
+# Motions near which limits of torques are linear: largest number, and the change of the time at which they end.
+REFERENCES, SAME_TIME = 12, 1e-4
+SLOWER = 0.25  # squared path speeds of a slower motion, over those of one near which there is no motion
 TANGENTS = 3  # number of optima, each with tangents at the previous one
 # Number of sections solved at a time.
 TOGETHER = 64
@@ -114,25 +118,93 @@ def least_time_motions(
     settings: Sequence[SectionSettings],
     guesses: Sequence[PathAccelerations | None] = (),
 ) -> list[LeastTime]:
-    """Find the fastest motions along sections; of limits of winches they keep those of speeds."""
-    problem, bounding, original = search_problem(problem), bounding_problem(problem), problem
-    paths = discretes(problem, sections, settings)
+    """Find the fastest motions along sections; of limits of winches they keep all but root mean squares."""
+    searched, bounding = search_problem(problem), bounding_problem(problem)
+    question = _Question(searched, bounding, _with_torques(problem, searched))
     guesses = guesses or [None] * len(sections)
-    cases = zip(paths, jumping_motions(paths, guesses), settings, strict=True)
-    answers = together(problem, [_proved(problem, bounding, *case) for case in cases])
+    answers = _solved(question, sections, settings, guesses)
     for finer in FINER:
         # A finer grid may give a motion, or its proof, where this one does not.
         unmet = [k for k, (_, is_met) in enumerate(answers) if not is_met]
         if not unmet:
             break
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in unmet]
-        paths = discretes(problem, [sections[k] for k in unmet], closer)
-        cases = zip(paths, jumping_motions(paths, [guesses[k] for k in unmet]), closer, strict=True)
-        for k, answer in zip(
-            unmet, together(problem, [_proved(problem, bounding, *case) for case in cases]), strict=True
-        ):
+        following = _solved(question, [sections[k] for k in unmet], closer, [guesses[k] for k in unmet])
+        for k, answer in zip(unmet, following, strict=True):
             answers[k] = answer
-    return [_with_motors(original.limits, problem.limits, answer) for answer, _ in answers]
+    return [_with_motors(problem.limits, searched.limits, answer) for answer, _ in answers]
+
+
+class _Question(NamedTuple):
+    # The problem of searches without motors, that of lower bounds, and that of motions that keep limits of motors.
+    searched: Problem
+    bounding: Problem
+    motors: Problem
+
+
+class _Case(NamedTuple):
+    # A section on its grid with its fastest motion, without limits of torques and with them.
+    settings: SectionSettings
+    path: Discrete
+    start: Jumping
+    plain: Discrete
+    plain_start: Jumping
+
+
+def _with_torques(problem: Problem, searched: Problem) -> Problem:
+    # Limits of speeds of motors are limits of cables in searches.
+    rows = [row for row in motor_limits_set(problem.limits) if row.name != "motor_speed_max"]
+    if not rows:
+        return searched
+    limits = dataclasses.replace(searched.limits, **{row.name: getattr(problem.limits, row.name) for row in rows})
+    return problem._replace(limits=limits)
+
+
+def _solved(
+    question: _Question,
+    sections: Sequence[Section],
+    settings: Sequence[SectionSettings],
+    guesses: Sequence[PathAccelerations | None],
+) -> list[tuple[LeastTime, bool]]:
+    paths = discretes(question.searched, sections, settings)
+    starts = jumping_motions(paths, guesses)
+    cases = [_Case(*each, *each[1:]) for each in zip(settings, paths, starts, strict=True)]
+    moving_ones = [k for k, start in enumerate(starts) if start.run is not None]
+    if question.motors is not question.searched:
+        for k, case in zip(
+            moving_ones, _keeping_torques(question.motors, [cases[k] for k in moving_ones]), strict=True
+        ):
+            cases[k] = case
+    return together(question.motors, [_proved(question, case) for case in cases])
+
+
+def _keeping_torques(problem: Problem, cases: list[_Case]) -> list[_Case]:
+    # Take each motion as the next one near which limits of torques are linear, until times hardly change; take a slower
+    # one where there is none, since limits are stricter far below the speeds at which they are linear.
+    times, going = np.full(len(cases), np.inf), list(range(len(cases)))
+    runs: list[Any] = [case.start.run for case in cases]
+    for _ in range(REFERENCES):
+        chosen = [cases[k] for k in going]
+        sections, settings = [case.path.section for case in chosen], [case.settings for case in chosen]
+        paths = discretes(problem, sections, settings, [runs[k] for k in going])
+        rows = list(zip(going, paths, jumping_motions(paths), strict=True))
+        going = []
+        for k, path, start in rows:
+            if start.run is None and np.isfinite(times[k]):
+                continue
+            cases[k] = cases[k]._replace(path=path, start=start)
+            time = np.inf if start.run is None else float(cell_times(start.run, path.grid.width).sum())
+            if not times[k] - time < SAME_TIME * time:
+                going.append(k)
+            runs[k], times[k] = start.run or _slowed(runs[k]), time
+        if not going:
+            break
+    return cases
+
+
+def _slowed(run: PathSpeeds) -> PathSpeeds:
+    x, before, after = (SLOWER * part for part in run[:3])
+    return run._replace(x=x, before=before, after=after)
 
 
 def _with_motors(limits: Limits, searched: Limits, answer: LeastTime) -> LeastTime:
@@ -147,17 +219,17 @@ def _with_motors(limits: Limits, searched: Limits, answer: LeastTime) -> LeastTi
     return dataclasses.replace(answer, names=tuple(names))
 
 
-def _proved(
-    problem: Problem, bounding: Problem, path: Discrete, start: Jumping, settings: SectionSettings
-) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
+def _proved(question: _Question, case: _Case) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere; return whether it does. The generator
     # yields motions, and receives the bounds of their slacks.
-    jumping, u_rate, first = start
-    if jumping is None:
+    problem, settings, path = question.motors, case.settings, case.path
+    jumping, u_rate, first = case.start
+    plain = case.plain_start.run
+    if jumping is None or plain is None:
         return _without_motion(problem, path, first), False
     section = path.section
-    fastest_time = float(cell_times(jumping, path.grid.width).sum())
-    bound = _bound(bounding, path, settings, jumping.x, fastest_time)
+    fastest_time, plain_time = (float(cell_times(run, path.grid.width).sum()) for run in (jumping, plain))
+    bound = _bound(question.bounding, case.plain, settings, plain.x, plain_time)
     run, jerk = _ramped(path, jumping, settings.ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
     slower: PathSpeeds | None = run

@@ -13,6 +13,7 @@ from jax import Array
 from cspr_jax.curves.spline import Spline, piece_state, piece_values
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes, path_half_planes
+from cspr_jax.families.paths.least_time.motor_bounds import Reference
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
@@ -47,6 +48,22 @@ class PathGrid(NamedTuple):
     def width(self) -> np.ndarray:
         """Widths of the cells, (n_cells,), m."""
         return np.diff(self.nodes)
+
+
+class PathSpeeds(NamedTuple):
+    """Path speeds and accelerations of a motion along a section.
+
+    Fields:
+        x: (n_nodes,) squared path speeds.
+        before: (n_cells,) path accelerations at the starts of the cells.
+        after: (n_cells,) path accelerations at the ends of the cells.
+        rests: whether the motion is at rest at the start, and at the end; s is the cube of time over the cell there.
+    """
+
+    x: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    rests: tuple[bool, bool] = (False, False)
 
 
 class PathPoints(NamedTuple):
@@ -137,16 +154,22 @@ def state_at(point: PathPoints) -> State:
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _half_planes(robot: AnyRobot, limits: Limits, arguments: tuple[PathPoints, Array]) -> HalfPlanes:
-    return jax.vmap(lambda point, speed: path_half_planes(robot, limits, state_at(point), speed))(*arguments)
+def _half_planes(robot: AnyRobot, limits: Limits, arguments: tuple[PathPoints, Array, Reference | None]) -> HalfPlanes:
+    return jax.vmap(lambda point, speed, reference: path_half_planes(robot, limits, state_at(point), speed, reference))(
+        *arguments
+    )
 
 
 def side_half_planes(
-    robot: AnyRobot, limits: Limits, curves: Sequence[Spline], grids: Sequence[PathGrid]
+    robot: AnyRobot,
+    limits: Limits,
+    curves: Sequence[Spline],
+    grids: Sequence[PathGrid],
+    references: Sequence[PathSpeeds | None],
 ) -> list[tuple[HalfPlanes, HalfPlanes]]:
-    """Half-planes at the starts and at the ends of the cells of several sections."""
-    points, speeds, jumps_of_grids = [], [], []
-    for curve, grid in zip(curves, grids, strict=True):
+    """Half-planes at the starts and at the ends of the cells of several sections; all have references, or none has."""
+    points, speeds, jumps_of_grids, near = [], [], [], list[Reference]()
+    for curve, grid, run in zip(curves, grids, references, strict=True):
         # Compute only one side of each node, and the other one where something jumps.
         jumps = np.flatnonzero(np.isin(grid.nodes, curve.jumps()) | np.pad(grid.speed[1:] != grid.speed[:-1], 1))
         points += [
@@ -155,9 +178,14 @@ def side_half_planes(
         ]
         speeds += [grid.speed, grid.speed[[*(jumps - 1).tolist(), -1]]]
         jumps_of_grids.append(jumps)
+        if run is not None:
+            behind = run.after[[*(jumps - 1).tolist(), -1]], run.x[[*jumps.tolist(), -1]]
+            near += [Reference(run.before, run.x[:-1]), Reference(*behind)]
     together = jax.tree.map(lambda *x: np.concatenate(x), *points)
     batch = BATCH if len(curves) == 1 else MANY
-    half_planes = in_batches(partial(_half_planes, robot, limits), (together, np.concatenate(speeds)), batch_size=batch)
+    reference = jax.tree.map(lambda *x: np.concatenate(x), *near) if near else None
+    arguments = (together, np.concatenate(speeds), reference)
+    half_planes = in_batches(partial(_half_planes, robot, limits), arguments, batch_size=batch)
     sides, first = [], 0
     for grid, jumps in zip(grids, jumps_of_grids, strict=True):
         count = len(grid.speed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
@@ -14,6 +16,7 @@ from cspr_jax.families.paths.least_time.discrete import GridMargins
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 from cspr_jax.verification.bounds.block_slacks import rate_slacks, speed_slacks
 from cspr_jax.verification.criteria import Criterion, criteria
@@ -30,6 +33,12 @@ HALVINGS = 3
 # Units of criteria on speeds and on accelerations, which depend on how fast a motion is.
 SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
 Answer = TypeVar("Answer")
+OF_MOTORS = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_winch))
+
+
+def _is_tension(row: Criterion) -> bool:
+    # Limits of motors of redundant cables are limits of all tensions together.
+    return bool(row.flag & TENSIONS or (row.flag & OF_MOTORS and row.unit == "N"))
 
 
 class Trial(NamedTuple):
@@ -91,9 +100,10 @@ class CellSlacks(NamedTuple):
             more = np.where(missed > 0.0, MORE * missed + STEP, 0.0)
             return maximum_filter1d(more, 2 * radius + 1, mode="nearest")
 
-        tension = weight * lacking([bool(criterion.flag & TENSIONS) for criterion in self.criteria])
-        others = (lacking([criterion.unit == unit for criterion in self.criteria]) for unit in (ACCELERATIONS, SPEEDS))
-        return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
+        tension = weight * lacking([_is_tension(criterion) for criterion in self.criteria])
+        speed = lacking([criterion.unit == SPEEDS for criterion in self.criteria])
+        acceleration = lacking([not _is_tension(row) and row.unit != SPEEDS for row in self.criteria])
+        return GridMargins(*(old + more for old, more in zip(margins, (tension, acceleration, speed), strict=True)))
 
     def binding(
         self, feed: Float[np.ndarray, "n_cells"], words: Mapping[float, str]
@@ -120,10 +130,10 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
     weight = float(robot.mass * robot.gravity)
     chosen = [
         k
-        for k, criterion in enumerate(all_criteria)
-        if criterion.flag & TENSIONS or criterion.unit in (SPEEDS, ACCELERATIONS)
+        for k, row in enumerate(all_criteria)
+        if _is_tension(row) or row.unit in (SPEEDS, ACCELERATIONS) or row.flag & OF_MOTORS
     ]
-    scales = np.array([weight if all_criteria[k].flag & TENSIONS else all_criteria[k].allowed for k in chosen])
+    scales = np.array([weight if _is_tension(all_criteria[k]) else all_criteria[k].allowed for k in chosen])
     knots = [np.asarray(motion.knots) for motion in motions]
     counts = [len(each) - 1 for each in knots]
     start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))

@@ -7,35 +7,18 @@ far from the path it is between them.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section
-from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, points_on
+from cspr_jax.families.paths.least_time.nodes import PathGrid, PathSpeeds, derivatives, points_on
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
 
 # Fractions of the time of a cell at which the distance from the path is measured.
 FRACTIONS = (0.25, 0.5, 0.75)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-
-
-class PathSpeeds(NamedTuple):
-    """Path speeds and accelerations of a motion along a section.
-
-    Fields:
-        x: (n_nodes,) squared path speeds.
-        before: (n_cells,) path accelerations at the starts of the cells.
-        after: (n_cells,) path accelerations at the ends of the cells.
-        rests: whether the motion is at rest at the start, and at the end; s is the cube of time over the cell there.
-    """
-
-    x: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    rests: tuple[bool, bool] = (False, False)
 
 
 def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
