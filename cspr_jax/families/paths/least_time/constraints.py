@@ -165,7 +165,7 @@ def _of_motors(
     # tensions.
     tension, weight = _linear_tensions(wrenches), robot.mass * robot.gravity
     both = [
-        LinearBounds(*(sign * (side - own) for own, side in zip(tension, bound, strict=True)))
+        LinearBounds(*(sign * (side - own[None, None]) for own, side in zip(tension, bound, strict=True)))
         for sign, bound in ((1.0, motors.high), (-1.0, motors.low))
     ]
     slack = LinearBounds(*(jnp.stack(parts).ravel() / weight for parts in zip(*both, strict=True)))
@@ -187,7 +187,7 @@ def _of_motors_together(
     )
     along = tension_faces(robot, limits, wrenches.matrix).along
     ups, downs = jnp.maximum(along, 0.0), jnp.minimum(along, 0.0)
-    has_bound = (along != 0.0).any(1) & ~(((downs != 0.0) & ~jnp.isfinite(high.constant)).any(1))
+    has_bound = (along != 0.0).any(1) & ~(((downs != 0.0) & ~jnp.isfinite(high.constant)[None]).any(1))
     high = high._replace(constant=jnp.where(jnp.isfinite(high.constant), high.constant, 0.0))
     slack = LinearBounds(
         *(

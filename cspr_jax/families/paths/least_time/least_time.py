@@ -194,7 +194,7 @@ def _keeping_torques(problem: Problem, cases: list[_Case]) -> list[_Case]:
                 continue
             cases[k] = cases[k]._replace(path=path, start=start)
             time = np.inf if start.run is None else float(cell_times(start.run, path.grid.width).sum())
-            if not times[k] - time < SAME_TIME * time:
+            if start.run is None or times[k] - time >= SAME_TIME * time:
                 going.append(k)
             runs[k], times[k] = start.run or _slowed(runs[k]), time
         if not going:

@@ -45,7 +45,7 @@ def _of_motors(problem: Problem) -> list[HalfPlaneName]:
     robot, rows = problem.robot, motor_limits_set(problem.limits)
     if robot.n_cables > robot.dof:
         return [(Verdict.WRENCH_INFEASIBLE, None)] * face_count(robot)
-    names: list[HalfPlaneName] = [(row.flag, k) for row in rows for _ in SIDES for k in range(robot.n_cables)]
+    names: list[HalfPlaneName] = [(row.flag, k) for row in rows for _ in SIDES[0] for k in range(robot.n_cables)]
     return names * 2
 
 
