@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.families.paths.least_time.motor_bounds import LinearBounds, MotorTensions, Reference, motor_tensions
+from cspr_jax.families.paths.least_time.motor_bounds import LinearBounds, MotorTensions, ReferenceMotion, motor_tensions
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
@@ -93,7 +93,7 @@ def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
 
 
 def path_half_planes(
-    robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""], reference: Reference | None = None
+    robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""], reference: ReferenceMotion | None = None
 ) -> HalfPlanes:
     """Half-planes at one point; with a reference, those of motors come last."""
     wrenches = unit_wrenches(robot, state)
@@ -159,7 +159,7 @@ def _linear_tensions(wrenches: UnitWrenches) -> LinearBounds:
 
 
 def _of_motors(
-    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, _: Reference
+    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, _: ReferenceMotion
 ) -> tuple[Array, ...]:
     # Make two half-planes for each limit, side of friction and cable, over the weight: of largest, then of smallest
     # tensions.
@@ -176,7 +176,7 @@ def _of_motors(
 
 
 def _of_motors_together(
-    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, reference: Reference
+    robot: AnyRobot, limits: Limits, wrenches: UnitWrenches, motors: MotorTensions, reference: ReferenceMotion
 ) -> tuple[Array, ...]:
     # Make one half-plane for each face of the set of wrenches whose tensions lie within the narrowest of all bounds.
     weight, tension = robot.mass * robot.gravity, _linear_tensions(wrenches)
@@ -191,8 +191,8 @@ def _of_motors_together(
     high = high._replace(constant=jnp.where(jnp.isfinite(high.constant), high.constant, 0.0))
     slack = LinearBounds(
         *(
-            jnp.sum(along * own[None] - ups * least[None] - downs * most[None], axis=1) / weight
-            for own, least, most in zip(tension, low, high, strict=True)
+            jnp.sum(along * own[None] - ups * minimum[None] - downs * maximum[None], axis=1) / weight
+            for own, minimum, maximum in zip(tension, low, high, strict=True)
         )
     )
     loss = jnp.sum(jnp.abs(along), axis=1) / weight
@@ -200,17 +200,17 @@ def _of_motors_together(
     return u, x, jnp.where(has_bound, slack.constant, 1.0), loss
 
 
-def _narrowest(bounds: LinearBounds, static: Array, reference: Reference, sign: float) -> LinearBounds:
+def _narrowest(bounds: LinearBounds, static: Array, reference: ReferenceMotion, sign: float) -> LinearBounds:
     # The bound of each cable that is narrowest at the reference; sign 1 for largest, -1 for smallest tensions.
     count, none = bounds.u.shape[-1], jnp.zeros((1, bounds.u.shape[-1]))
-    every = LinearBounds(
+    candidates = LinearBounds(
         *(
             jnp.concatenate([more, part.reshape(-1, count)])
             for more, part in zip((none, none, static[None]), bounds, strict=True)
         )
     )
-    nearest = jnp.argmin(sign * every.at(reference), axis=0, keepdims=True)
-    return LinearBounds(*(jnp.take_along_axis(part, nearest, axis=0)[0] for part in every))
+    nearest = jnp.argmin(sign * candidates.at(reference), axis=0, keepdims=True)
+    return LinearBounds(*(jnp.take_along_axis(part, nearest, axis=0)[0] for part in candidates))
 
 
 def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:

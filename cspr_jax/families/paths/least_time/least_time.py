@@ -120,31 +120,32 @@ def least_time_motions(
 ) -> list[LeastTime]:
     """Find the fastest motions along sections; of limits of winches they keep all but root mean squares."""
     searched, bounding = search_problem(problem), bounding_problem(problem)
-    question = _Question(searched, bounding, _with_torques(problem, searched))
+    problems = _SearchProblems(searched, bounding, _with_torques(problem, searched))
     guesses = guesses or [None] * len(sections)
-    answers = _solved(question, sections, settings, guesses)
+    answers = _solved(problems, sections, settings, guesses)
     for finer in FINER:
         # A finer grid may give a motion, or its proof, where this one does not.
         unmet = [k for k, (_, is_met) in enumerate(answers) if not is_met]
         if not unmet:
             break
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in unmet]
-        following = _solved(question, [sections[k] for k in unmet], closer, [guesses[k] for k in unmet])
+        following = _solved(problems, [sections[k] for k in unmet], closer, [guesses[k] for k in unmet])
         for k, answer in zip(unmet, following, strict=True):
             answers[k] = answer
     return [_with_motors(problem.limits, searched.limits, answer) for answer, _ in answers]
 
 
-class _Question(NamedTuple):
+class _SearchProblems(NamedTuple):
     # The problem of searches without motors, that of lower bounds, and that of motions that keep limits of motors.
     searched: Problem
     bounding: Problem
     motors: Problem
 
 
-class _Case(NamedTuple):
+class _SectionSearch(NamedTuple):
     # A section on its grid with its fastest motion, without limits of torques and with them.
     settings: SectionSettings
+    guess: PathAccelerations | None
     path: Discrete
     start: Jumping
     plain: Discrete
@@ -161,24 +162,24 @@ def _with_torques(problem: Problem, searched: Problem) -> Problem:
 
 
 def _solved(
-    question: _Question,
+    problems: _SearchProblems,
     sections: Sequence[Section],
     settings: Sequence[SectionSettings],
     guesses: Sequence[PathAccelerations | None],
 ) -> list[tuple[LeastTime, bool]]:
-    paths = discretes(question.searched, sections, settings)
+    paths = discretes(problems.searched, sections, settings)
     starts = jumping_motions(paths, guesses)
-    cases = [_Case(*each, *each[1:]) for each in zip(settings, paths, starts, strict=True)]
+    cases = [_SectionSearch(*each, *each[2:]) for each in zip(settings, guesses, paths, starts, strict=True)]
     moving_ones = [k for k, start in enumerate(starts) if start.run is not None]
-    if question.motors is not question.searched:
+    if problems.motors is not problems.searched:
         for k, case in zip(
-            moving_ones, _keeping_torques(question.motors, [cases[k] for k in moving_ones]), strict=True
+            moving_ones, _keeping_torques(problems.motors, [cases[k] for k in moving_ones]), strict=True
         ):
             cases[k] = case
-    return together(question.motors, [_proved(question, case) for case in cases])
+    return together(problems.motors, [_proved(problems, case) for case in cases])
 
 
-def _keeping_torques(problem: Problem, cases: list[_Case]) -> list[_Case]:
+def _keeping_torques(problem: Problem, cases: list[_SectionSearch]) -> list[_SectionSearch]:
     # Take each motion as the next one near which limits of torques are linear, until times hardly change; take a slower
     # one where there is none, since limits are stricter far below the speeds at which they are linear.
     times, going = np.full(len(cases), np.inf), list(range(len(cases)))
@@ -187,7 +188,7 @@ def _keeping_torques(problem: Problem, cases: list[_Case]) -> list[_Case]:
         chosen = [cases[k] for k in going]
         sections, settings = [case.path.section for case in chosen], [case.settings for case in chosen]
         paths = discretes(problem, sections, settings, [runs[k] for k in going])
-        rows = list(zip(going, paths, jumping_motions(paths), strict=True))
+        rows = list(zip(going, paths, jumping_motions(paths, [case.guess for case in chosen]), strict=True))
         going = []
         for k, path, start in rows:
             if start.run is None and np.isfinite(times[k]):
@@ -219,17 +220,17 @@ def _with_motors(limits: Limits, searched: Limits, answer: LeastTime) -> LeastTi
     return dataclasses.replace(answer, names=tuple(names))
 
 
-def _proved(question: _Question, case: _Case) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
+def _proved(problems: _SearchProblems, case: _SectionSearch) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere; return whether it does. The generator
     # yields motions, and receives the bounds of their slacks.
-    problem, settings, path = question.motors, case.settings, case.path
+    problem, settings, path = problems.motors, case.settings, case.path
     jumping, u_rate, first = case.start
     plain = case.plain_start.run
     if jumping is None or plain is None:
         return _without_motion(problem, path, first), False
     section = path.section
     fastest_time, plain_time = (float(cell_times(run, path.grid.width).sum()) for run in (jumping, plain))
-    bound = _bound(question.bounding, case.plain, settings, plain.x, plain_time)
+    bound = _bound(problems.bounding, case.plain, settings, plain.x, plain_time)
     run, jerk = _ramped(path, jumping, settings.ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
     slower: PathSpeeds | None = run

@@ -28,7 +28,7 @@ SIDES = np.array([[[1.0], [-1.0]]])
 SLOWEST = 1e3 * STANDSTILL
 
 
-class Reference(NamedTuple):
+class ReferenceMotion(NamedTuple):
     """Motion near which limits of motors are linear.
 
     Fields:
@@ -53,7 +53,7 @@ class LinearBounds(NamedTuple):
     x: Array
     constant: Array
 
-    def at(self, reference: Reference) -> Array:
+    def at(self, reference: ReferenceMotion) -> Array:
         """Values at the reference."""
         return self.u * reference.u + self.x * reference.x + self.constant
 
@@ -72,16 +72,16 @@ class MotorTensions(NamedTuple):
     width: Array
 
 
-def motor_tensions(robot: AnyRobot, limits: Limits, state: State, reference: Reference) -> MotorTensions:
+def motor_tensions(robot: AnyRobot, limits: Limits, state: State, reference: ReferenceMotion) -> MotorTensions:
     """Tensions at one point of a path, traversed at unit path speed by `state`."""
     winches: Any = robot.winches
     length, rate, acceleration = cable_motion(robot, state)
     radius = radii(winches, length) / winches.gear_ratio
     speed, speed_change = -rate / radius, -acceleration / radius
-    size = jnp.maximum(jnp.abs(speed), SLOWEST)
-    root = jnp.maximum(jnp.sqrt(reference.x), SLOWEST / size)
+    magnitude = jnp.maximum(jnp.abs(speed), SLOWEST)
+    root = jnp.maximum(jnp.sqrt(reference.x), SLOWEST / magnitude)
     # The motor's speed, by the tangent of the square root.
-    turning = LinearBounds(jnp.zeros_like(speed), 0.5 * size / root, 0.5 * size * root)
+    turning = LinearBounds(jnp.zeros_like(speed), 0.5 * magnitude / root, 0.5 * magnitude * root)
     viscous = winches.viscous_friction * jnp.sign(speed)
     own_u = (winches.motor_inertia * speed)[None, None]
     own_x = (winches.motor_inertia * speed_change + viscous * turning.x)[None, None]

@@ -13,7 +13,7 @@ from jax import Array
 from cspr_jax.curves.spline import Spline, piece_state, piece_values
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes, path_half_planes
-from cspr_jax.families.paths.least_time.motor_bounds import Reference
+from cspr_jax.families.paths.least_time.motor_bounds import ReferenceMotion
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
@@ -154,7 +154,9 @@ def state_at(point: PathPoints) -> State:
 
 
 @persistent_jit(compiler_options=compile_options.proof_options())
-def _half_planes(robot: AnyRobot, limits: Limits, arguments: tuple[PathPoints, Array, Reference | None]) -> HalfPlanes:
+def _half_planes(
+    robot: AnyRobot, limits: Limits, arguments: tuple[PathPoints, Array, ReferenceMotion | None]
+) -> HalfPlanes:
     return jax.vmap(lambda point, speed, reference: path_half_planes(robot, limits, state_at(point), speed, reference))(
         *arguments
     )
@@ -168,7 +170,7 @@ def side_half_planes(
     references: Sequence[PathSpeeds | None],
 ) -> list[tuple[HalfPlanes, HalfPlanes]]:
     """Half-planes at the starts and at the ends of the cells of several sections; all have references, or none has."""
-    points, speeds, jumps_of_grids, near = [], [], [], list[Reference]()
+    points, speeds, jumps_of_grids, near = [], [], [], list[ReferenceMotion]()
     for curve, grid, run in zip(curves, grids, references, strict=True):
         # Compute only one side of each node, and the other one where something jumps.
         jumps = np.flatnonzero(np.isin(grid.nodes, curve.jumps()) | np.pad(grid.speed[1:] != grid.speed[:-1], 1))
@@ -180,7 +182,7 @@ def side_half_planes(
         jumps_of_grids.append(jumps)
         if run is not None:
             behind = run.after[[*(jumps - 1).tolist(), -1]], run.x[[*jumps.tolist(), -1]]
-            near += [Reference(run.before, run.x[:-1]), Reference(*behind)]
+            near += [ReferenceMotion(run.before, run.x[:-1]), ReferenceMotion(*behind)]
     together = jax.tree.map(lambda *x: np.concatenate(x), *points)
     batch = BATCH if len(curves) == 1 else MANY
     reference = jax.tree.map(lambda *x: np.concatenate(x), *near) if near else None
