@@ -165,7 +165,7 @@ def _of_motors(
     # tensions.
     tension, weight = _linear_tensions(wrenches), robot.mass * robot.gravity
     both = [
-        LinearBounds(*(sign * (side - own[None, None]) for own, side in zip(tension, bound, strict=True)))
+        LinearBounds(*(sign * (side - linear[None, None]) for linear, side in zip(tension, bound, strict=True)))
         for sign, bound in ((1.0, motors.high), (-1.0, motors.low))
     ]
     slack = LinearBounds(*(jnp.stack(parts).ravel() / weight for parts in zip(*both, strict=True)))
@@ -191,8 +191,8 @@ def _of_motors_together(
     high = high._replace(constant=jnp.where(jnp.isfinite(high.constant), high.constant, 0.0))
     slack = LinearBounds(
         *(
-            jnp.sum(along * own[None] - ups * minimum[None] - downs * maximum[None], axis=1) / weight
-            for own, minimum, maximum in zip(tension, low, high, strict=True)
+            jnp.sum(along * linear[None] - ups * minimum[None] - downs * maximum[None], axis=1) / weight
+            for linear, minimum, maximum in zip(tension, low, high, strict=True)
         )
     )
     loss = jnp.sum(jnp.abs(along), axis=1) / weight

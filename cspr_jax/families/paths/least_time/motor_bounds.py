@@ -83,17 +83,19 @@ def motor_tensions(robot: AnyRobot, limits: Limits, state: State, reference: Ref
     # The motor's speed, by the tangent of the square root.
     turning = LinearBounds(jnp.zeros_like(speed), 0.5 * magnitude / root, 0.5 * magnitude * root)
     viscous = winches.viscous_friction * jnp.sign(speed)
-    own_u = (winches.motor_inertia * speed)[None, None]
-    own_x = (winches.motor_inertia * speed_change + viscous * turning.x)[None, None]
-    own = (viscous * turning.constant)[None, None] + SIDES * winches.friction[None, None]
+    no_load_u = (winches.motor_inertia * speed)[None, None]
+    no_load_x = (winches.motor_inertia * speed_change + viscous * turning.x)[None, None]
+    no_load = (viscous * turning.constant)[None, None] + SIDES * winches.friction[None, None]
     rows = [_allowed(winches, row.quantity, getattr(limits, row.name), turning) for row in motor_limits_set(limits)]
     torque_x, torque = (jnp.stack([row[k] * jnp.ones_like(speed) for row in rows])[:, None] for k in (0, 1))
     gain = radius[None, None] * winches.efficiency[None, None] ** -SIDES
     acts = SIDES * (speed * jnp.sqrt(reference.x))[None, None] >= -STANDSTILL
 
     def bounds(sign: float) -> LinearBounds:
-        constant = jnp.where(acts, (sign * torque - own) / gain, sign * jnp.inf)
-        return LinearBounds(jnp.broadcast_to(-own_u / gain, constant.shape), (sign * torque_x - own_x) / gain, constant)
+        constant = jnp.where(acts, (sign * torque - no_load) / gain, sign * jnp.inf)
+        return LinearBounds(
+            jnp.broadcast_to(-no_load_u / gain, constant.shape), (sign * torque_x - no_load_x) / gain, constant
+        )
 
     width = jnp.where(acts, (torque + torque_x * reference.x) / gain, 0.0)
     return MotorTensions(bounds(-1.0), bounds(1.0), width)
