@@ -23,13 +23,12 @@ from cspr_jax.errors.arguments import Cables, Integer, Times
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.machine.stops.candidates import ProvedStop
 from cspr_jax.machine.stops.fastest import ConsecutiveMotions, Emergency, fastest_stops
-from cspr_jax.machine.stops.instants import BACK
 from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame, frame_of
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 from cspr_jax.outputs import stop_report
 from cspr_jax.robots.model.patterns import PATTERNS
 
@@ -183,7 +182,7 @@ def _planned_stop(
     if quaternion is not None:
         # Orientations are relative to the reference orientation of the robot that the plan moves.
         relative = emergency.frame.rotated_quaternions(quaternion)[None]
-        between = products(emergency.reference[None], (sequence.reference * BACK)[None])
+        between = products(emergency.reference[None], (sequence.reference * CONJUGATE)[None])
         quaternion = emergency.frame.rotated_quaternions(products(relative, between)[0])
     return stop_report.PlannedStop(
         time, stop.kind, stop.duration, end.position, quaternion, stop.proof.margin_bound, motion

@@ -17,7 +17,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -30,7 +30,6 @@ MOVING = 0.2  # an end that is faster than this fraction of the largest speed mo
 AT_REST = 1e-6  # m/s; samples that are slower are at rest, but for rounding
 BESIDE = 1e-9  # fraction of the largest coordinate by which rounding may move a robot off its plane or guide
 JOINT_STAYS = 1e-6  # m; a joint that moves less is taken as fixed: tables of six decimals are rounded
-BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def samples_of(times, positions, quaternions=None, velocities=None, accelerations=None) -> MotionTable:
@@ -129,7 +128,7 @@ def placed_inward(
     if turning is not None:
         units = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)
         # The product is linear in the quaternion, so it applies to Bernstein coefficients too.
-        turning = as_float64(products(units, (reference * BACK)[None]).reshape(turning.shape))
+        turning = as_float64(products(units, (reference * CONJUGATE)[None]).reshape(turning.shape))
     moved = dataclasses.replace(spline, position=as_float64(frame.inward(spline.position)), quaternion=turning)
     if centre is None or not np.any(centre) or turning is None:
         return moved

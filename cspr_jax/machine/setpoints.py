@@ -14,12 +14,13 @@ import jax
 import numpy as np
 
 from cspr_jax.machine.drum_motions import drums_and_motors
+from cspr_jax.motion.limits import choosing_limits
 from cspr_jax.motion.motion import Motion, common_shape
 from cspr_jax.motion.ticks import ticks
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.limits import Limits
 
 BATCH = 512  # number of instants computed at a time
 
@@ -59,8 +60,7 @@ def set_points(
     rule: str,
 ) -> SetPoints:
     """Set points along consecutive motions."""
-    # Without a choice of tensions limits do nothing: leave them out, so that plans share compiled code.
-    limits = limits if robot.n_cables > robot.dof else NO_LIMITS
+    limits = choosing_limits(robot, limits)
     times, taus = ticks(durations, rate)
     parts = []
     for motion, tau in zip(motions, taus, strict=True):

@@ -18,6 +18,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.machine.drum_motions import drums_and_motors
+from cspr_jax.motion.limits import choosing_limits
 from cspr_jax.motion.motion import Motion, common_shape, sample_times
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.rotations import matrix
@@ -27,7 +28,7 @@ from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.elasticity.springs import unstretched_lengths
-from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.model.tension_rule_table import CENTRED
 from cspr_jax.robots.model.winches import STANDSTILL, radii, torques
@@ -123,7 +124,7 @@ def motor_demands(
     rule: str,
 ) -> MotionDemands:
     """Compute what consecutive motions ask of the motors of a robot with winches."""
-    limits = limits if robot.n_cables > robot.dof else NO_LIMITS
+    limits = choosing_limits(robot, limits)
     largest, sums, duration = [], [], 0.0
     for motion, count in zip(motions, samples, strict=True):
         of_motion = partial(winding_states, robot, limits, common_shape(motion), rule=rule)
@@ -173,7 +174,7 @@ def winding_curves(
     robot: AnyRobot, limits: Limits, motions: Sequence[Motion], rule: str, count: int = CURVE
 ) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
     """Winding speeds and torques along consecutive motions, `count` times each."""
-    limits = limits if robot.n_cables > robot.dof else NO_LIMITS
+    limits = choosing_limits(robot, limits)
     parts = [
         in_batches(
             partial(winding_states, robot, limits, common_shape(motion), rule=rule),

@@ -15,7 +15,7 @@ from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.state import State
@@ -44,6 +44,11 @@ def without_motors(limits: Limits) -> Limits:
     """Limits without those of winches."""
     names = [row.name for row in LIMITS if row.of_winch and getattr(limits, row.name) is not None]
     return dataclasses.replace(limits, **dict.fromkeys(names)) if names else limits
+
+
+def choosing_limits(robot: AnyRobot, limits: Limits) -> Limits:
+    """Limits among which tensions are chosen: none without a choice, so that robots share compiled functions."""
+    return limits if robot.n_cables > robot.dof else NO_LIMITS
 
 
 def search_limits(robot: AnyRobot, limits: Limits) -> Limits:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.families.free.poses import BACK, FreePoses
+from cspr_jax.families.free.poses import FreePoses
 from cspr_jax.families.free.search.equations import coordinates
 from cspr_jax.families.free.search.starts import Starts
 from cspr_jax.families.free.search.tasks import Tasks
@@ -14,7 +14,7 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import Leg
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 from cspr_jax.robots.model.point_mass import spool_radius
 
 # Motions may miss poses by this fraction of the robot's radius r, and velocities by this fraction of sqrt(g r).
@@ -87,7 +87,7 @@ def controls_of(single: Tasks, motion: Motion) -> np.ndarray:
     state = states_at(motion, single.basis.averages)
     samples = np.asarray(state.position)[:, along]
     if len(about):
-        turning = products(np.asarray(state.quaternion), single.references[0, 0][None] * BACK)
+        turning = products(np.asarray(state.quaternion), single.references[0, 0][None] * CONJUGATE)
         with np.errstate(divide="ignore", invalid="ignore"):
             samples = np.concatenate([samples, turning[:, 1 + about] / turning[:, :1]], axis=1)
     return single.basis.fit @ samples

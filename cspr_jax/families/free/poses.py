@@ -20,7 +20,7 @@ from cspr_jax.families.free.search.tasks import Tasks, Unknowns
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -30,7 +30,6 @@ from cspr_jax.verification.criteria import pose_conditions
 
 # Along a segment, determinant and depth below the spools stay above these fractions of the smaller value at its ends.
 REGULAR, SHALLOW = 1e-2, 0.5
-BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class FreePoses(NamedTuple):
@@ -91,7 +90,7 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     # Relative to the mean of both orientations, Rodrigues vectors are not longer than 1.
     references = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
     for side, quaternions in enumerate((start, end)):
-        turning = products(quaternions, references * BACK)
+        turning = products(quaternions, references * CONJUGATE)
         vector = turning[:, 1:] / turning[:, :1]
         ends[:, side, len(along) :] = vector[:, about]
         for i, v in enumerate(vector):

@@ -10,7 +10,7 @@ from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of_leg
 from cspr_jax.config.keys.path import GRID, RAMP_TIME, PathTable
-from cspr_jax.curves.files import BACK, kept_to, placed_inward, reference_of
+from cspr_jax.curves.files import kept_to, placed_inward, reference_of
 from cspr_jax.curves.spline import Spline, chained, part
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.paths.answers import PathAnswers, SectionAnswer, feeds_of
@@ -24,6 +24,7 @@ from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.linear.rotations import CONJUGATE
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.runtime.stages import amount, stage
 from cspr_jax.verification.proved_answers import proved_answers
@@ -186,7 +187,7 @@ class Paths(Leg):
         turning = np.array(IDENTITY)
         if table.kind == "csv" and units is not None:
             reference = reference_of(build_robot(robot_file, waypoints.plan_file, waypoints.path))
-            turning = waypoints.frame.rotated_quaternions(reference * BACK)
+            turning = waypoints.frame.rotated_quaternions(reference * CONJUGATE)
         axes = FileAxes(robot_file.z_axis, np.eye(3)[1 if robot_file.is_planar else 2], turning)
         return path_of(table, ends, waypoints.path.parent, axes)
 

@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from cspr_jax.curves.interpolation import continuous
 from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
 from cspr_jax.machine.stops.instants import StateSamples
+from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.numerics.shapes import Float
 
 KNOTS = 41  # of a stop
@@ -93,18 +95,10 @@ def _turning(part: StateSamples, first: np.ndarray, second: np.ndarray) -> list[
         return None
     omega = part.angular_velocity * first
     alpha = part.angular_acceleration * first**2 + part.angular_velocity * second
-    turns = part.quaternion * _signs(part.quaternion)
+    turns = continuous(part.quaternion)
+
+    def pure(vectors: np.ndarray) -> np.ndarray:
+        return np.insert(vectors, 0, 0.0, axis=1)
+
     square = np.sum(omega**2, axis=1, keepdims=True)
-    return [turns, half_product(omega, turns), half_product(alpha, turns) - 0.25 * square * turns]
-
-
-def _signs(quaternions: np.ndarray) -> np.ndarray:
-    # Signs with which quaternions are continuous.
-    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0)
-    return np.cumprod(np.append(1.0, flips))[:, None]
-
-
-def half_product(vectors: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
-    """Halves of the products of pure quaternions and quaternions."""
-    scalar = -np.sum(vectors * quaternions[:, 1:], axis=1, keepdims=True)
-    return 0.5 * np.concatenate([scalar, vectors * quaternions[:, :1] + np.cross(vectors, quaternions[:, 1:])], axis=1)
+    return [turns, 0.5 * products(pure(omega), turns), 0.5 * products(pure(alpha), turns) - 0.25 * square * turns]

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from cspr_jax.machine.stops.candidates import Candidate, hermite_spline
-from cspr_jax.machine.stops.instants import BACK, StateSamples
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.machine.stops.instants import StateSamples
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 
 HALVES = (1, 2, 3, 4, 6, 8, 12, 16, 24)  # half swings until the amplitude is 0
 DEPTHS = (1.0, 0.8, 1.25)  # depths of P0, over that of the robot at the instant
@@ -72,7 +72,7 @@ def _level(samples: StateSamples, k: int, times: np.ndarray) -> list[np.ndarray]
     if samples.quaternion is None or samples.angular_velocity is None or samples.angular_acceleration is None:
         return None
     q0 = samples.quaternion[k]
-    back = (q0 if q0[0] >= 0.0 else -q0) * BACK
+    back = (q0 if q0[0] >= 0.0 else -q0) * CONJUGATE
     end, duration = back[1:] / max(back[0], 0.5), times[-1]
     b, c = 0.5 * duration * samples.angular_velocity[k], 0.25 * duration**2 * samples.angular_acceleration[k]
     u = (times / duration)[:, None]

@@ -11,11 +11,10 @@ import numpy as np
 
 from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.numerics.linear.frames import Frame
-from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.linear.rotations import CONJUGATE, products
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.state import State
 
-BACK = np.array([1.0, -1.0, -1.0, -1.0])
 # Speeds and accelerations below this fraction of sqrt(g r) and g count as rest, with the radius r of the robot; angular
 # ones, times r, likewise.
 RESTING = 1e-9
@@ -82,7 +81,7 @@ class StateSamples:
         changes: dict[str, Any] = {"position": after.inward(before.outward(self.position))}
         if self.quaternion is not None:
             # Both kernels have parallel axes; only the platform's own axes may differ.
-            between = products(references[0][None], (references[1] * BACK)[None])
+            between = products(references[0][None], (references[1] * CONJUGATE)[None])
             changes["quaternion"] = products(self.quaternion, between)
         return dataclasses.replace(self, **{name: np.asarray(value) for name, value in changes.items()})
 

@@ -64,9 +64,13 @@ def products(left: np.ndarray, right: np.ndarray) -> Float[np.ndarray, "n 4"]:
     return np.concatenate([scalar, vector], axis=1)
 
 
+# A quaternion times these signs is its conjugate.
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+
+
 def conjugate(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
     """The opposite rotation."""
-    return quaternion * jnp.array([1.0, -1.0, -1.0, -1.0], quaternion.dtype)
+    return quaternion * jnp.array(CONJUGATE, quaternion.dtype)
 
 
 def upper(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
