@@ -21,12 +21,12 @@ from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Cables, ManyTimes, PointsOfMany, QuaternionsOfMany, VectorsOfMany
 from cspr_jax.motion.cause import Cause
-from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.verification.attained import with_attained
+from cspr_jax.verification.mean_torques import with_means_of_each
 from cspr_jax.verification.proved_answers import answers_of, proofs_of, verify_all_robots
 
 
@@ -118,9 +118,9 @@ def check_many(  # noqa: PLR0913
                 raise InputError(
                     f"motion {i}, {error.key}", error.value, error.allowed, problem=error.problem
                 ) from error
-        check_no_means(problem.limits, "limits.")
         batch, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, spec, NAME, trajectory=spec)
         proofs = proofs_of(problem, batch.bounds, batch.durations, scene, batch.jumps)
+        proofs = with_means_of_each(problem, proofs, motions)
         answers = with_attained(problem, answers_of(proofs, batch.durations), motions, scene)
         verify_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")

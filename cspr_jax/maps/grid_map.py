@@ -13,7 +13,7 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motion.given_limits import check_no_means, check_no_motors
+from cspr_jax.motion.given_limits import check_no_motors
 from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.shapes import Bool, Float
@@ -62,7 +62,8 @@ class GridMap(abc.ABC):
             any_cables=self.any_cables,
         )
         try:
-            (check_no_means if self.motors else check_no_motors)(self._problem.limits)
+            if not self.motors:
+                check_no_motors(self._problem.limits)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
 

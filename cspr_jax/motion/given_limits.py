@@ -118,7 +118,7 @@ def check_no_means(limits: Limits, at: str = "") -> None:
     """Refuse limits of full motions where single motions are parts of no plan."""
     if limits.motor_torque_rms_max is not None:
         value = np.unique(np.asarray(limits.motor_torque_rms_max)).tolist()
-        raise InputError(f"{at}motor_torque_rms_max", value, "absent: only plans and checks of one motion take it")
+        raise InputError(f"{at}motor_torque_rms_max", value, "absent: only plans, checks, and maps of arcs take it")
 
 
 def _refuse_of_motion(robot: Any, limits: Limits, accelerates: bool, moves: bool) -> None:

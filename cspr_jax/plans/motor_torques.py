@@ -43,7 +43,7 @@ def with_mean_torques(problem: Problem, legs: Sequence[JoinedLeg], scene: Callab
             proofs[i] = proof_of(problem, leg.motions[i], scene())
         # A segment that is not at fault stays feasible, and so does its proof.
         for i in np.flatnonzero(rows | (not at_fault.any())).tolist():
-            if proofs[i] is not None:
+            if proofs[i] is not None and not any(row.flag & MEAN for row in proofs[i].criteria):
                 proofs[i] = extended(proofs[i], totals, largest)
         verdict[rows] |= MEAN if is_over.any() else FLAGS(Verdict.UNDECIDED.value)
         results.append(dataclasses.replace(leg, answers=dataclasses.replace(answers, proof=proofs, verdict=verdict)))

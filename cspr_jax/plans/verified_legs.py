@@ -54,7 +54,11 @@ class VerifiedLeg(Leg):
         """Join the poses by proved motions where there are any; see `Leg.join`."""
         waypoints, plain, prescribed = self.waypoints, self._plain(problem), self.waypoints.arcs
         has_scene = bool(waypoints.plan_file.obstacle_keys) or problem.robot.pulleys is not None
-        verifier = Verifier(problem, scene_of_leg(problem.robot, waypoints) if has_scene else None)
+        scene, is_plan = (
+            scene_of_leg(problem.robot, waypoints) if has_scene else None,
+            len(waypoints.plan_file.pose) == 2,
+        )
+        verifier = Verifier(problem, scene, are_plans=is_plan)
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, list[Motion]]:

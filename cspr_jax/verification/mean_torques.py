@@ -182,9 +182,19 @@ def extended(case: MotionProof, totals: MeanTorques, limit: Float[np.ndarray, "n
     return case._replace(criteria=(*case.criteria, *rows), proof=proof, scales=np.append(case.scales, limit))
 
 
-def proof_with_means(problem: Problem, motion: Any, scene: Scene | None) -> MotionProof:
-    """Proof of one motion that is a full plan; without means where other criteria are not proved."""
-    case, limit = proof_of(problem, motion, scene), problem.limits.motor_torque_rms_max
+def with_means(problem: Problem, case: MotionProof, motion: Any) -> MotionProof:
+    """A proof of a motion that is a full plan, with means where all other criteria are proved."""
+    limit = problem.limits.motor_torque_rms_max
     if limit is None or not case.is_feasible:
         return case
     return extended(case, mean_torques(problem, [motion]), np.asarray(limit))
+
+
+def with_means_of_each(problem: Problem, proofs: Sequence[MotionProof], motions: Sequence[Any]) -> list[MotionProof]:
+    """Proofs of motions, each of which is a full plan, with means."""
+    return [with_means(problem, *each) for each in zip(proofs, motions, strict=True)]
+
+
+def proof_with_means(problem: Problem, motion: Any, scene: Scene | None) -> MotionProof:
+    """Proof of one motion that is a full plan; without means where other criteria are not proved."""
+    return with_means(problem, proof_of(problem, motion, scene), motion)

@@ -57,11 +57,13 @@ class Verifier(NamedTuple):
         problem: the problem, whose robot may have pulleys, and whose limits may be those of winches.
         scene: bodies that can meet, in the robot's axes; None: the family has proved contacts.
         intervals: whether to find intervals of failure, as in `time_proofs`.
+        are_plans: whether each motion is a full plan, so that it keeps the limit of the root mean square of torques.
     """
 
     problem: Problem
     scene: Scene | None
     intervals: bool = True
+    are_plans: bool = False
 
     @property
     def has_pulleys(self) -> bool:
@@ -72,7 +74,15 @@ class Verifier(NamedTuple):
     def parts(self) -> CriterionParts:
         """Criteria that the family has not proved."""
         motors = bool(motor_limits_set(self.problem.limits))
-        return ALL if self.has_pulleys else CriterionParts(usual=False, motors=motors, contacts=self.scene is not None)
+        if self.has_pulleys:
+            return ALL
+        parts = CriterionParts(usual=False, motors=motors, contacts=self.scene is not None)
+        # Means need the proof of something.
+        return parts._replace(usual=True) if self._has_means and not any(parts) else parts
+
+    @property
+    def _has_means(self) -> bool:
+        return self.are_plans and self.problem.limits.motor_torque_rms_max is not None
 
     def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> VerifiedSegments:
         """Smallest numbers of arcs whose motions are proved."""
@@ -136,10 +146,18 @@ class Verifier(NamedTuple):
 
     def _proofs(self, motions: Any, rows: np.ndarray, intervals: bool) -> list[MotionProof]:
         how: Any = {"scene": self.scene, "parts": self.parts}
-        if not isinstance(motions, list):
+        if not len(rows):
+            return []
+        if isinstance(motions, list):
+            proofs = proofs_of_each(self.problem, [motions[i] for i in rows], intervals=intervals, **how)
+        else:
             batch = motions.take(rows)
-            return proofs_of(self.problem, batch.bounds, batch.durations, intervals=intervals, **how)
-        return proofs_of_each(self.problem, [motions[i] for i in rows], intervals=intervals, **how) if len(rows) else []
+            proofs = proofs_of(self.problem, batch.bounds, batch.durations, intervals=intervals, **how)
+        if not self._has_means:
+            return proofs
+        from cspr_jax.verification.mean_torques import with_means_of_each  # few maps need it
+
+        return with_means_of_each(self.problem, proofs, [motions[i] for i in rows])
 
     def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
         # Verify contacts of feasible motions for all robots within an uncertainty; the family has verified the rest.

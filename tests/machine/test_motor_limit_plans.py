@@ -56,9 +56,10 @@ def test_root_mean_square(torques):
 
 
 @pytest.mark.thorough
-def test_cells_of_maps_equal_plans():
+@pytest.mark.parametrize("limits", [{"motor_torque_max": 0.013}, {"motor_torque_rms_max": 0.0084}])
+def test_cells_of_maps_equal_plans(limits):
     """Verdicts and numbers of arcs of three cells, which need 1, 2 and 2 arcs without the limit."""
-    usual, xs = {"amplitude": "quintic", "limits": {"motor_torque_max": 0.013}}, [0.02, 0.1, 0.2]
+    usual, xs = {"amplitude": "quintic", "limits": limits}, [0.02, 0.1, 0.2]
     start = {"family": PLAN["family"], "amplitude": usual["amplitude"], "from": {"rest": True}, "max_arcs": 6}
     axes = {"x": xs, "y": [0.1], "z": [1.4], "z0": [1.4]}
     sweep = {"schema": 1, "map": "minimum-arcs", "robot": PLAN["robot"], "axes": axes, "trajectory": start}
@@ -104,3 +105,25 @@ def test_motors_bind_rows_of_motion_files(torques):
     assert (_segment(motor_torque_max=1e3 * limit)[0].rows(100.0)["binding"] == Verdict.SLACK_CABLE).any()
     worst = np.abs(torques[1]).argmax(1) + 1
     np.testing.assert_array_equal(rows["binding_cable"][inside][named[inside]], worst[inside][named[inside]])
+
+
+def _poses(times, positions):
+    return [{"time": time, "position": each} for time, each in zip(times.tolist(), positions.tolist(), strict=True)]
+
+
+def test_means_of_many_checks():
+    """Two motions of 2 s, of which the longer one needs more torque on average."""
+    times, positions = np.linspace(0.0, 2.0, 5), np.zeros((2, 5, 3))
+    positions[..., 2] = 1.4
+    positions[0, :, 0], positions[1, :, 0] = np.linspace(0.0, 0.02, 5), np.linspace(0.0, 0.1, 5)
+    robot = cspr_jax.with_cables(cspr_jax.point_mass_robot(SPOOLS, mass=0.2), winch=WINCH)
+    plans = [
+        {"schema": 1, "family": "spline", "robot": PLAN["robot"], "pose": _poses(times, each)} for each in positions
+    ]
+    segments = [cspr_jax.plan(plan).to_dict()["segments"] for plan in plans]
+    # The motor with the largest mean is the same in all segments, which are of one duration.
+    means = [np.sqrt(np.mean([row["motor_torque_rms_max"] ** 2 for row in rows])) for rows in segments]
+    between = 0.5 * float(means[0] + means[1])
+    checks = cspr_jax.check_many(robot, times, positions, limits={"motor_torque_rms_max": between})
+    assert means[0] < means[1] and checks.verdict.tolist()[0] == 0
+    assert [cause.criterion for cause in checks.causes[1]] == ["motor_over_torque_rms"]

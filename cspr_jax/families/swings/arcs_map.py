@@ -49,7 +49,7 @@ class MinimumArcsMap(PointMassMap):
             motions = Hypocycloid(segments, self._problem.amplitude, as_float64(answers.tried_arcs))
             return answers, MotionBatch(motions, answers.duration, batch_bounds)
 
-        verifier = Verifier(self._problem, self._scene, intervals=False)
+        verifier = Verifier(self._problem, self._scene, intervals=False, are_plans=True)
         return verifier.columns(join, len(cells["z0"]), max_arcs=max_arcs)
 
     def refuse_hopeless(self, grid: Grid) -> None:

@@ -81,7 +81,7 @@ class PosesMap(PlatformMap):
             each = PlatformMotion(segments, self._problem.amplitude, as_float64(answers.tried_arcs), kind)
             return answers, MotionBatch(each, answers.duration, partial(batch_bounds, kind=kind), orders=4)
 
-        verifier = Verifier(self._problem, self._scene, intervals=False)
+        verifier = Verifier(self._problem, self._scene, intervals=False, are_plans=True)
         return verifier.columns(join, len(motions.z0), max_arcs=self._keys.trajectory.max_arcs)
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
