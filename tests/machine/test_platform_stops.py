@@ -165,7 +165,7 @@ def check_stops(name, seed, instants):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["six cables", "obstacle"])
+@pytest.mark.parametrize("name", ["obstacle"])
 def test_stops_keep_what_they_promise(name):
     kinds, margins = check_stops(name, 0, 3)
     assert len(margins) == 3, kinds

@@ -18,6 +18,8 @@ CASES = {
     "load": ({}, LINE),
     "all": ({"motor_torque_max": TORQUE, "motor_power_max": POWER, "motor_speed_max": 60.0}, LINE),
 }
+# The others run with `make soak`.
+FEW = ("torque", "all")
 
 
 def _planned(limits, line, **more):
@@ -93,7 +95,9 @@ class _Line:
 
 
 @pytest.mark.quick("torque")
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.soak) for name in CASES]
+)
 def test_least_times_beside_a_phase_plane(name):
     limits, line = CASES[name]
     segment = _planned(limits, line)
