@@ -203,27 +203,20 @@ def figures(monkeypatch):
 @pytest.fixture
 def small_bench(monkeypatch):
     """Sizes with which `cspr bench` takes seconds."""
-    from cspr_jax.bench import (
-        ellipses,
-        forward_kinematics,
-        motions,
-        paths,
-        six_cables,
-        three_cables,
-        timing,
-        workspaces,
-    )
+    from cspr_jax import bench
 
-    monkeypatch.setattr(timing, "REPEATS", 1)
-    monkeypatch.setattr(timing, "SIDE", 8)
-    monkeypatch.setattr(timing, "COPIED", 4096)
-    monkeypatch.setattr(three_cables, "BATCHES", 1)
-    monkeypatch.setattr(three_cables, "NUMPY_SEGMENTS", 2)
-    monkeypatch.setattr(ellipses, "COUNT", 256)
-    monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
-    monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
-    monkeypatch.setattr(six_cables, "LANES", 64)
-    monkeypatch.setattr(motions, "rates", lambda: {"3 cables, 10001 rows": 12.0})
-    monkeypatch.setattr(paths, "rates", lambda: {"3 cables": 500.0})
-    monkeypatch.setattr(forward_kinematics, "rates", lambda: {"3 cables": 1e6})
-    monkeypatch.setattr(workspaces, "rates", lambda: {"8 cables": {"float32": 2e6, "float64": 1e6, "first_s": 1.0}})
+    monkeypatch.setattr(bench.timing, "REPEATS", 1)
+    monkeypatch.setattr(bench.timing, "SIDE", 8)
+    monkeypatch.setattr(bench.timing, "COPIED", 4096)
+    monkeypatch.setattr(bench.three_cables, "BATCHES", 1)
+    monkeypatch.setattr(bench.three_cables, "NUMPY_SEGMENTS", 2)
+    monkeypatch.setattr(bench.ellipses, "COUNT", 256)
+    monkeypatch.setattr(bench.six_cables, "NUMPY_TRAJECTORIES", 2)
+    monkeypatch.setattr(bench.six_cables, "TRAJECTORIES", 400)
+    monkeypatch.setattr(bench.six_cables, "LANES", 64)
+    monkeypatch.setattr(bench.motions, "rates", lambda: {"3 cables, 10001 rows": 12.0})
+    monkeypatch.setattr(bench.paths, "rates", lambda: {"3 cables": 500.0})
+    monkeypatch.setattr(bench.forward_kinematics, "rates", lambda: {"3 cables": 1e6})
+    monkeypatch.setattr(
+        bench.workspaces, "rates", lambda: {"8 cables": {"float32": 2e6, "float64": 1e6, "first_s": 1.0}}
+    )

@@ -208,10 +208,13 @@ def _along(case: tuple[Any, Limits, Any], motions: list[Motion], **how: str) -> 
     # Values at times (n_motions, n) along motions of one structure, (n_motions, n, ...). Searches for several extremes
     # meet at the same times, each of which is computed once.
     shape = common_shape(motions[0])
-    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(array, float) for array in leaves]), *motions)
+    # One motion may have very many pieces.
+    stacked: Any = None
+    if len(motions) > 1:
+        stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(array, float) for array in leaves]), *motions)
 
     def values(tau: np.ndarray) -> np.ndarray:
-        if len(motions) == 1:
+        if stacked is None:
             times, rows = np.unique(tau, return_inverse=True)
             computed = in_batches(partial(_values_of_one, case, shape, **how), times, batch_size=BATCH)
         else:

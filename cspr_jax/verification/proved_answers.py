@@ -31,6 +31,7 @@ from cspr_jax.verification.time_proof import TimeProof, time_proofs
 # Number of intervals between samples of a motion without bounds.
 SAMPLES = 2000
 ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
+OF_NOTHING = TimeProof(np.empty(0), np.empty(0), np.empty(0), [], [], 0)
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
 
 
@@ -63,7 +64,7 @@ class MotionProof(NamedTuple):
     def broken(self) -> np.ndarray:
         """Mask (n_criteria,) of the criteria that fail at some time."""
         return (self.proof.high < levels(self.criteria)) | np.array(
-            [len(intervals) > 0 for intervals in self.proof.failing]
+            [len(intervals) > 0 for intervals in self.proof.failing], bool
         )
 
     @property
@@ -88,7 +89,7 @@ class MotionProof(NamedTuple):
 
     def smallest(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
         """Smallest bound of the criteria that have, or do not have, some flags."""
-        chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
+        chosen = np.array([bool(row.flag & flags) != others for row in self.criteria], bool)
         return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
 
     def with_feeds(self, motion: Any, feeds: np.ndarray | None) -> "MotionProof":
@@ -213,6 +214,8 @@ def proofs_of(
 ) -> list[MotionProof]:
     """Proofs of several motions at once."""
     rows = _criteria(problem, scene, parts)
+    if not rows:
+        return [_proof(problem, rows, OF_NOTHING, scene, parts)] * len(durations)
 
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
         of_motion = partial(bounds, motion)

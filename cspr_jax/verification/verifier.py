@@ -74,11 +74,7 @@ class Verifier(NamedTuple):
     def parts(self) -> CriterionParts:
         """Criteria that the family has not proved."""
         motors = bool(motor_limits_set(self.problem.limits))
-        if self.has_pulleys:
-            return ALL
-        parts = CriterionParts(usual=False, motors=motors, contacts=self.scene is not None)
-        # Means need the proof of something.
-        return parts._replace(usual=True) if self._has_means and not any(parts) else parts
+        return ALL if self.has_pulleys else CriterionParts(usual=False, motors=motors, contacts=self.scene is not None)
 
     @property
     def _has_means(self) -> bool:
@@ -124,13 +120,15 @@ class Verifier(NamedTuple):
         answers, proofs, _ = self.smallest(join, np.zeros(count, int), step=1, max_arcs=max_arcs)
         if not self.parts.contacts:
             return answers.arrays()
-        first = len(criteria(self.problem.robot, self.problem.limits, self.scene, self.parts._replace(contacts=False)))
-        clearance = np.array([np.nan if proof is None else proof.proof.high[first:].min() for proof in proofs])
+        # Contacts are the last criteria but for means.
+        case = self.problem.robot, self.problem.limits, self.scene
+        contacts = slice(len(criteria(*case, self.parts._replace(contacts=False))), len(criteria(*case, self.parts)))
+        clearance = np.array([np.nan if proof is None else proof.proof.high[contacts].min() for proof in proofs])
         return answers.arrays() | {"clearance": clearance}
 
     def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
         # Verify motions of a family; without pulleys only those that the family has proved.
-        if not any(self.parts):  # the family has proved all but what a plan keeps as a whole
+        if not (any(self.parts) or self._has_means):  # the family has proved all but what a plan keeps as a whole
             proved = np.where(answers.feasible, 0, answers.verdict).astype(FLAGS)
             return _Trial(answers, [None] * len(proved), proved)
         is_verified = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)

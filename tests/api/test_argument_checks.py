@@ -387,6 +387,11 @@ def test_every_keyword_that_nearly_fits_is_asked_about():
         cspr_jax.Limits(xyz=1.0)
 
 
+def test_inherited_methods_have_the_name_of_the_object():
+    with pytest.raises(TypeError, match=r"^Replay\.plot\(\) takes no sizee: did you mean size\?$"):
+        cspr_jax.Replay.plot(object.__new__(cspr_jax.Replay), sizee=(16, 10))
+
+
 def test_public_names_are_listed():
     assert set(cspr_jax.__all__) <= set(dir(cspr_jax))
 

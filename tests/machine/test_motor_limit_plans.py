@@ -127,3 +127,19 @@ def test_means_of_many_checks():
     checks = cspr_jax.check_many(robot, times, positions, limits={"motor_torque_rms_max": between})
     assert means[0] < means[1] and checks.verdict.tolist()[0] == 0
     assert [cause.criterion for cause in checks.causes[1]] == ["motor_over_torque_rms"]
+
+
+@pytest.mark.thorough
+def test_means_beside_obstacles_leave_clearances():
+    """Clearances of a map are those without the limit of the mean, which every cell keeps."""
+    start = {"family": PLAN["family"], "amplitude": "quintic", "from": {"rest": True}, "max_arcs": 6}
+    axes = {"x": [0.1, 0.2], "y": [0.1], "z": [1.4], "z0": [1.4]}
+    ball = {"name": "ball", "kind": "sphere", "centre": [0.2, 0.1, 1.9], "radius": 0.1}
+    sweep = {"schema": 1, "map": "minimum-arcs", "robot": PLAN["robot"], "axes": axes, "trajectory": start}
+    sweep["obstacle"] = [ball]
+    clearances = [
+        cspr_jax.compute_sweep(sweep | {"limits": limits})["clearance"].values
+        for limits in ({}, {"motor_torque_rms_max": 0.02})
+    ]
+    assert np.isfinite(clearances[0]).all()
+    np.testing.assert_array_equal(*clearances)

@@ -65,7 +65,7 @@ def checked(
             try:
                 bound = signature.bind(*arguments, **keywords).arguments
             except TypeError:
-                ask_about_keywords(own_name, keywords, signature.parameters)
+                ask_about_keywords(_name_for(own_name, arguments), keywords, signature.parameters)
                 return function(*arguments, **keywords)  # raises the usual TypeError, with the function's own name
             for key, rule in rules().items():
                 if key not in bound:
@@ -84,6 +84,11 @@ def checked(
         return with_checks  # type: ignore[return-value]
 
     return decorator
+
+
+def _name_for(name: str, arguments: tuple[Any, ...]) -> str:
+    # Users know an inherited method by the class of their object.
+    return f"{type(arguments[0]).__name__}.{name.rpartition('.')[2]}" if "." in name and arguments else name
 
 
 def rules_of(function: Callable[..., Any]) -> dict[str, Rule]:
