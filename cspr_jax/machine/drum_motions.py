@@ -17,6 +17,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.motion.motion import Motion
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot, cable_motion
@@ -63,7 +64,7 @@ AT_REST = 1e-9
 def _resting(state: State, drums: DrumStates) -> DrumStates:
     # Before and after a motion from rest to rest the drums rest too, even if its third derivative jumps there.
     moving = [state.velocity, state.acceleration, state.angular_velocity, state.angular_acceleration]
-    fastest = jnp.max(jnp.concatenate([jnp.abs(jnp.ravel(each)) for each in moving if each is not None]))
+    fastest = maximum_of(jnp.concatenate([jnp.abs(jnp.ravel(each)) for each in moving if each is not None]))
     rests = fastest <= AT_REST
     derivatives = [jnp.where(rests, 0.0, each) for each in (drums.rate, drums.acceleration)]
     return drums._replace(rate=derivatives[0], acceleration=derivatives[1])

@@ -21,6 +21,7 @@ from cspr_jax.machine.drum_motions import drums_and_motors
 from cspr_jax.motion.limits import choosing_limits
 from cspr_jax.motion.motion import Motion, common_shape, sample_times
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.numerics.quadrature import integrals
 from cspr_jax.numerics.search.minima import narrowed
@@ -87,7 +88,7 @@ def _worse(winches: Any, length: Array, rate: Array, acceleration: Array, tensio
         jnp.where(jnp.abs(winding) >= jnp.abs(paying), winding, paying),
         jnp.where(speed > 0, winding, paying),
     )
-    rounding = jnp.maximum(RESTS, winches.gear_ratio / radius * NOISE * jnp.max(jnp.abs(rate)))
+    rounding = jnp.maximum(RESTS, winches.gear_ratio / radius * NOISE * maximum_of(jnp.abs(rate)))
     rests = jnp.abs(speed) <= rounding
     torque = jnp.where(rests | (jnp.abs(speed) <= STANDSTILL), static, moving)
     return jnp.where(rests, 0.0, speed), torque, jnp.where(rests, static, moving)

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.numerics.tolerances import BOUNDARY
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -39,12 +40,12 @@ def verdict(
     doubt = jnp.where(wider.offsets < faces.offsets, rounding, jnp.maximum(BOUNDARY * robot.gravity, rounding))
     # A flat set has no inside: its margin is the distance beside it.
     flat = jnp.where(wider.is_regular, jnp.inf, wider.margin(acceleration))
-    broken, is_beside = slacks < -doubt, flat < -jnp.max(doubt)
+    broken, is_beside = slacks < -doubt, flat < -maximum_of(doubt)
     is_out = jnp.where(wider.is_regular, broken.any(), is_beside)
     over = is_out & (broken & faces.of_largest).any()
     slack = is_out & ((broken & ~faces.of_largest).any() | ~over)
     above = is_out & ~(plane_normal(robot) @ position > 0.0)
-    doubtful = ~is_out & (jnp.where(wider.is_regular, (slacks <= doubt).any(), flat <= jnp.max(doubt)))
+    doubtful = ~is_out & (jnp.where(wider.is_regular, (slacks <= doubt).any(), flat <= maximum_of(doubt)))
     flags = (
         (slack, Verdict.SLACK_CABLE),
         (over, Verdict.OVER_TENSION),
@@ -91,7 +92,7 @@ def acceleration_ranges(
     def until(steepness: Array) -> Array:
         # Largest acceleration along the directions that have these components along the normals of the faces.
         distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
-        return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
+        return jnp.where(margin > 0.0, jnp.maximum(minimum_of(distance), 0.0), 0.0)
 
     across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
     return AccelerationRanges(
@@ -131,7 +132,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
         along = jnp.concatenate([edge, -edge, normal])
     endless = (along @ normal.T >= -LEVEL).all(1) & (jnp.linalg.norm(along, axis=1) > LEVEL)
     is_open = endless.any() | ~is_line.any()
-    largest = jnp.max(jnp.where(inside, jnp.linalg.norm(points, axis=1), 0.0))
+    largest = maximum_of(jnp.where(inside, jnp.linalg.norm(points, axis=1), 0.0))
     return jnp.where(faces.is_regular, jnp.where(is_open & inside.any(), jnp.inf, largest), 0.0)
 
 
@@ -142,8 +143,8 @@ def along(
     faces = faces_at(robot, limits, position)
     steep = faces.normals @ direction
     ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)
-    low = jnp.max(jnp.where(steep > LEVEL, ends, -jnp.inf))
-    high = jnp.min(jnp.where(steep < -LEVEL, ends, jnp.inf))
+    low = maximum_of(jnp.where(steep > LEVEL, ends, -jnp.inf))
+    high = minimum_of(jnp.where(steep < -LEVEL, ends, jnp.inf))
     beside = (jnp.abs(steep) <= LEVEL) & (faces.offsets > 0.0)
     return jnp.where((low > high) | beside.any(), jnp.nan, jnp.stack([low, high]))
 

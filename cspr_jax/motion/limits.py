@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.elementary import as_float64, maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
@@ -125,7 +125,7 @@ def lowest_depth(robot: AnyRobot, state: State, corners: Float[Array, "m 3"] | N
     if not isinstance(robot, PlatformRobot):
         return state.position[2]
     points = robot.platform_points if corners is None else jnp.concatenate([robot.platform_points, corners])
-    return state.position[2] + jnp.maximum(jnp.max(points @ state.rotation[2]), 0.0)
+    return state.position[2] + jnp.maximum(maximum_of(points @ state.rotation[2]), 0.0)
 
 
 def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
@@ -160,6 +160,6 @@ def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Float[Array,
     quantities = _values(robot, state, jnp.zeros(robot.n_cables))
     scale = scales(robot.n_cables, robot.mass * robot.gravity, z0)
     return [
-        jnp.min(slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale))
+        minimum_of(slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale))
         for row in other_limits(limits)
     ]

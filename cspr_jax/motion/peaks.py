@@ -15,6 +15,7 @@ from jax import Array
 from cspr_jax.motion.limits import lowest_depth, motor_limits_set
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.search.minima import CLOSE, narrowed_times
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
@@ -121,7 +122,7 @@ def _extremes(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Ar
     if robot.winches is not None:
         of_motors = motor_demands(robot.winches, (length, rate, rate_derivative), force)
         of_cables |= {name: -values for name, values in of_motors._asdict().items()}
-    extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
+    extremes = {name: minimum_of(values) for name, values in of_cables.items()} | {
         "depth_min": plane_normal(robot) @ state.position,
         "lowest": -lowest_depth(robot, state, corners),
         "mass_centre_speed": -jnp.linalg.norm(state.velocity),

@@ -19,6 +19,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set, scales, slack, values
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
@@ -77,7 +78,7 @@ def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Float[Array, ""]:
     """Smallest slack at equidistant times of a motion."""
     tau = jnp.linspace(0.0, 1.0, samples + 1)
-    return jnp.min(jax.vmap(lambda t: slacks(problem, motion, t))(tau))
+    return minimum_of(jax.vmap(lambda t: slacks(problem, motion, t))(tau))
 
 
 def _per_length(robot: AnyRobot, state: State) -> Array:

@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 from collections.abc import Iterator
-from typing import cast
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -56,6 +56,28 @@ def sincospi(x: Float[Array, "..."]) -> tuple[Float[Array, "..."], Float[Array, 
 def nan_ignoring_min(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
     """The smaller of two numbers in one machine instruction; XLA's minimum takes four, for the sake of NaN."""
     return jnp.where(a < b, a, b)
+
+
+def minimum_of(
+    values: Float[Array, "..."], axis: Any = None, *, keepdims: bool = False, initial: float | None = None
+) -> Float[Array, "..."]:
+    """Smallest of the values along axes; NaN where one of them is NaN."""
+    # In place of `jnp.min`: from jaxlib 0.10.2 on, XLA hands minima of some 4000 values or more to a library that
+    # leaves NaN out, and bounds that do not exist would count as infinitely good ones.
+    return _with_nan(jnp.min(values, axis=axis, keepdims=keepdims, initial=initial), values, axis, keepdims)
+
+
+def maximum_of(
+    values: Float[Array, "..."], axis: Any = None, *, keepdims: bool = False, initial: float | None = None
+) -> Float[Array, "..."]:
+    """Largest of the values along axes; NaN where one of them is NaN."""
+    return _with_nan(jnp.max(values, axis=axis, keepdims=keepdims, initial=initial), values, axis, keepdims)
+
+
+def _with_nan(extreme: Array, values: Array, axis: Any, keepdims: bool) -> Array:
+    if not jnp.issubdtype(extreme.dtype, jnp.floating):
+        return extreme
+    return jnp.where(jnp.isnan(values).any(axis=axis, keepdims=keepdims), jnp.nan, extreme)
 
 
 def length(vector: Float[Array, "n"]) -> Float[Array, ""]:

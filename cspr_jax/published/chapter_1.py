@@ -20,6 +20,7 @@ from cspr_jax.families.swings.transitions.envelope_oscillations import (
 )
 from cspr_jax.families.swings.transitions.transition import transition, weights
 from cspr_jax.motion.amplitudes import Amplitude, named
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.runtime.stages import stage
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one reading
@@ -51,7 +52,7 @@ def table_1_1() -> dict[Key, float | None]:
     cells: dict[Key, float | None] = {}
     for name, w in cases.items():
         stage(name)
-        cells["w_max", name, ""] = float(jnp.max(jnp.abs(w)))
+        cells["w_max", name, ""] = float(maximum_of(jnp.abs(w)))
         cells["n", name, ""] = _horizontal(named("A1"), w)
     return cells
 

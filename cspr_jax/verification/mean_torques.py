@@ -21,6 +21,7 @@ from jax import Array
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, flat
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import ROUNDING, TOUCHED
 from cspr_jax.robots.bounds.motor_bounds import motor_bounds, torque_bounds
@@ -142,8 +143,8 @@ def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array
         low, high = _squares(torque)
         one_case = _mean_square(torque)
         is_mixed = jnp.sum(may_act, axis=0) > 1
-        smallest = jnp.min(jnp.where(may_act, low, jnp.inf), axis=0)
-        largest = jnp.max(jnp.where(may_act, high, -jnp.inf), axis=0)
+        smallest = minimum_of(jnp.where(may_act, low, jnp.inf), axis=0)
+        largest = maximum_of(jnp.where(may_act, high, -jnp.inf), axis=0)
         of_case = (jnp.sum(jnp.where(may_act, side, 0.0), axis=0) for side in one_case)
         low, high = (jnp.where(is_mixed, *pair) for pair in zip((smallest, largest), of_case, strict=True))
         return jnp.where(low > 0.0, low, 0.0), jnp.where(high >= 0.0, high, jnp.inf)

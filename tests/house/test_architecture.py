@@ -227,6 +227,12 @@ def test_no_compiled_function_calls_lapack():
     assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
 
 
+def test_no_minimum_leaves_nan_out():
+    """Nor maximum: bounds that do not exist are NaN; see `numerics.elementary.minimum_of`."""
+    calls = re.compile(r"jnp\.(a?min|a?max|nanmin|nanmax)\(")
+    assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == ["elementary.py"]
+
+
 def test_files_side_loads_no_jax_and_the_command_line_nothing_heavy():
     without_jax = [name for name in INNER if name.startswith(tuple(f"{room}." for room in WITHOUT_JAX))]
     without_jax += [name for name in WITHOUT_JAX if name in INNER]

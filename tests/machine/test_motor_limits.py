@@ -110,6 +110,12 @@ def test_redundant_planar_point_mass():
     assert compare(4, "2T-3", names=names) == each_once(names)
 
 
+def test_blocks_without_bounds_prove_nothing():
+    """Lengths of cables over pulleys have no bounds over the first blocks, nor have radii of drums with layers then."""
+    names = ("motor_load_max",)
+    assert compare(8, "2T-2", names=names, layers=True, pulleys=True) == each_once(names)
+
+
 # Kinds whose cases take longest, and most of those with layers, run with `test_any_seed`.
 @pytest.mark.thorough
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cspr_jax.numerics.bounds.value_and_derivatives import Bounds
-from cspr_jax.numerics.elementary import polynomial, sincospi
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, polynomial, sincospi
 from cspr_jax.numerics.linear.lanes import smallest_of_each
 
 # As users' kernels are compiled, and with `compile_options.proof_options`: there sums and products are rounded apart.
@@ -134,3 +134,21 @@ def test_smallest_of_each_array():
     arrays[1, 4, 2], arrays[2, :, 0] = np.nan, np.inf
     found = jax.jit(smallest_of_each)(list(arrays))
     np.testing.assert_array_equal(found, arrays.min(1))
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (64, 64), (64, 2, 2, 2, 4, 2)])
+def test_extremes_keep_nan_however_many_values_there_are(shape):
+    """As NumPy's do; XLA alone leaves NaN out of many values."""
+    values = np.random.default_rng(2).normal(size=shape)
+    values.flat[:: values.size // 7] = np.nan
+    for axis in (None, *range(len(shape)), -1):
+        for found, wanted in ((minimum_of, np.min), (maximum_of, np.max)):
+            compiled = jax.jit(lambda x, found=found, axis=axis: found(x, axis=axis))(values)
+            np.testing.assert_array_equal(compiled, wanted(values, axis=axis))
+    alone = jax.jit(lambda x: smallest_of_each([x])[0])(values)
+    np.testing.assert_array_equal(alone, values.min(0))
+
+
+def test_extremes_of_whole_numbers_and_of_none():
+    assert maximum_of(jnp.arange(5)) == 4 and minimum_of(jnp.zeros(0), initial=jnp.inf) == jnp.inf
+    np.testing.assert_array_equal(minimum_of(jnp.ones((2, 3)), axis=1, keepdims=True), np.ones((2, 1)))

@@ -17,6 +17,7 @@ from cspr_jax.families.beziers.verdicts import BATCH, verdicts_within
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.robots.statics.force_balance import adjugate
@@ -37,7 +38,7 @@ def _proved_margins(robot: PointMassRobot, motions: Bezier):
     def one(motion):
         margins = smallest_margins(robot, motion)
         below = margins.below - margins.below_rounding
-        return jnp.minimum(jnp.min(margins.taut - margins.taut_rounding), below)
+        return jnp.minimum(minimum_of(margins.taut - margins.taut_rounding), below)
 
     return jax.vmap(one)(motions)
 

@@ -21,6 +21,7 @@ from cspr_jax.families.beziers.redundant_verdicts import proofs, slacks_at, verd
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
@@ -42,7 +43,7 @@ CLOSE = 1e-9
 def _sampled(problem: Problem, motions: Bezier) -> jax.Array:
     # Return the smallest slack of each segment, (n,).
     tau = jnp.linspace(0.0, 1.0, SAMPLES)
-    minimum = jax.vmap(lambda motion: jax.vmap(lambda t: slacks_at(problem, motion, t))(tau).min())(motions)
+    minimum = jax.vmap(lambda motion: minimum_of(jax.vmap(lambda t: slacks_at(problem, motion, t))(tau)))(motions)
     return jnp.where(jnp.isnan(minimum), -jnp.inf, minimum)
 
 

@@ -20,6 +20,7 @@ from cspr_jax.families.beziers.verdicts import smallest_slacks, verdicts
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.slacks import slacks
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.search.constrained_minima import Verified, constrained_minimum
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -68,7 +69,7 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.families.beziers.redundant_verdicts import slacks_at
 
-        sampled = jax.vmap(lambda motion: jax.vmap(lambda t: slacks_at(problem, motion, t))(tau).min(0))
+        sampled = jax.vmap(lambda motion: minimum_of(jax.vmap(lambda t: slacks_at(problem, motion, t))(tau), axis=0))
         return sampled(segments).ravel()
 
     def one(motion):
@@ -77,7 +78,7 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
         if not limits_set(problem.limits):
             return margins
         limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(margins) :])(tau)
-        return jnp.append(margins, jnp.min(limits, axis=0))
+        return jnp.append(margins, minimum_of(limits, axis=0))
 
     return jax.vmap(one)(segments).ravel()
 

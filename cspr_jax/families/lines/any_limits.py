@@ -18,6 +18,7 @@ from cspr_jax.families.lines.motion import s_curve
 from cspr_jax.families.lines.s_model import LeastDuration
 from cspr_jax.families.lines.slacks import LineSlacks, LineStates, slacks, tensions_at
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 
 # Number of samples of a piece of the S-model; each half of another law has twice as many.
@@ -84,8 +85,8 @@ def gain(
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
     # Samples of s'' miss its peak: take the peak from the law's formula.
-    high = jnp.minimum(jnp.min(above), largest / law.largest[2])
-    q_range = Gain(high, jnp.max(below), up, down)
+    high = jnp.minimum(minimum_of(above), largest / law.largest[2])
+    q_range = Gain(high, maximum_of(below), up, down)
     if "cable_acceleration_max" not in line.largest:
         return q_range
     count = groups[0].shape[-1]
@@ -130,10 +131,10 @@ def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], 
     numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_peak, above.shape).ravel()
     sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]
     names = [
-        jnp.where(jnp.min(side) < jnp.min(half), numbers[jnp.argmin(side)], name)
+        jnp.where(minimum_of(side) < minimum_of(half), numbers[jnp.argmin(side)], name)
         for side, half, name in zip(sides, halves, (q_range.up, q_range.down), strict=True)
     ]
-    return Gain(jnp.minimum(q_range.high, jnp.min(above)), q_range.low, *names)
+    return Gain(jnp.minimum(q_range.high, minimum_of(above)), q_range.low, *names)
 
 
 def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:

@@ -19,6 +19,7 @@ from cspr_jax.families.lines.slacks import LineSlacks, line_slacks
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, in_one_plane, plane_normal
@@ -151,7 +152,7 @@ def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_pla
         norms = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
         resting = -jnp.stack([faces.offset, faces.offset + faces.offset_change]) / jnp.where(norms > 0.0, norms, 1.0)
         there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
-        rest = jnp.min(jnp.where(there, resting, jnp.inf))
+        rest = minimum_of(jnp.where(there, resting, jnp.inf))
         is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
         if not in_plane:
             return minimum, fastest.least_time(bounds, everywhere=False), rest, jnp.asarray(jnp.inf), is_bounded

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius
 from cspr_jax.robots.statics.wrench_sets import FLAT, normals_to, spanning
@@ -106,8 +107,8 @@ def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
     # Find the part of the line where no product is negative and some are positive.
     change = start - end
     crossing = start / jnp.where(change != 0.0, change, 1.0)
-    first = jnp.max(jnp.where((start < 0.0) & (end > 0.0), crossing, 0.0), axis=1)
-    last = jnp.min(jnp.where((start > 0.0) & (end < 0.0), crossing, 1.0), axis=1)
+    first = maximum_of(jnp.where((start < 0.0) & (end > 0.0), crossing, 0.0), axis=1)
+    last = minimum_of(jnp.where((start > 0.0) & (end < 0.0), crossing, 1.0), axis=1)
     never = ((start <= 0.0) & (end <= 0.0) & ((start < 0.0) | (end < 0.0))).any(1)
     flat = ((start == 0.0) & (end == 0.0)).all(1)
     return first, jnp.where(never | flat, first, last)

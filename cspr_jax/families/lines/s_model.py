@@ -18,6 +18,7 @@ from jax import Array, lax
 
 from cspr_jax.families.lines.faces import Sides
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.search.minima import Bracket, golden_step, inner_points
 from cspr_jax.numerics.shapes import Float
 
@@ -73,7 +74,7 @@ def least_s_curve(sides: Sides, *, touching: bool = True) -> LeastDuration:
 
     ratio = jax.nn.sigmoid(lax.fori_loop(0, ROUNDS, step, jnp.zeros_like(sides.up[0])))
     up, down = gains(ratio)
-    gain = jnp.minimum(jnp.min(up), jnp.min(down))
+    gain = jnp.minimum(minimum_of(up), minimum_of(down))
     duration = jnp.where(gain > 0.0, 1.0 / jnp.sqrt(jnp.where(gain > 0.0, gain, 1.0)), jnp.inf)
     return LeastDuration(ratio, duration, jnp.argmin(up), jnp.argmin(down))
 
@@ -112,10 +113,10 @@ def least_of_law(law: Amplitude, sides: Sides) -> LeastDuration:
         first = Bracket(low, high, left, right, at(left), at(right))
         last = lax.fori_loop(0, SECTIONS, lambda _, bracket: golden_step(at, bracket, left_if_equal=False)[0], first)
         narrow = jnp.minimum(jnp.minimum(last.at_left, last.at_right), at(low))
-        return jnp.minimum(narrow, jnp.min(values, axis=0))
+        return jnp.minimum(narrow, minimum_of(values, axis=0))
 
     up, down = smallest(sides.up, sides.up_change), smallest(sides.down, sides.down_change)
-    gain = jnp.minimum(jnp.min(up), jnp.min(down))
+    gain = jnp.minimum(minimum_of(up), minimum_of(down))
     duration = jnp.where(gain > 0.0, 1.0 / jnp.sqrt(jnp.where(gain > 0.0, gain, 1.0)), jnp.inf)
     return LeastDuration(jnp.full_like(gain, 0.5), duration, jnp.argmin(up), jnp.argmin(down))
 
@@ -178,7 +179,7 @@ def _lowest(start: Array, change: Array, points: Array, holds: Array | None) -> 
         return start[index], change[index]
     values = jnp.where(holds, values, jnp.inf)
     index = jnp.argmin(values, axis=1)
-    return jnp.where(jnp.isfinite(values.min(1)), start[index], jnp.inf), change[index]
+    return jnp.where(jnp.isfinite(minimum_of(values, axis=1)), start[index], jnp.inf), change[index]
 
 
 def _time(ends: Array, nodes: Array, energy: Array, start: Array, change: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.elementary import length, solved
+from cspr_jax.numerics.elementary import length, maximum_of, minimum_of, solved
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot, rays
@@ -62,8 +62,8 @@ def endpoint(
     is_flat = squared_norm <= (FLAT * mean_tension) ** 2
     preferred = -jnp.dot(offset - mean_tension, derivative) / jnp.where(is_flat, 1.0, squared_norm)  # (3.91)
     where_slack = -offset / jnp.where(derivative == 0.0, 1.0, derivative)
-    lowest = jnp.max(jnp.where(derivative > 0.0, where_slack, -jnp.inf))
-    highest = jnp.min(jnp.where(derivative < 0.0, where_slack, jnp.inf))
+    lowest = maximum_of(jnp.where(derivative > 0.0, where_slack, -jnp.inf))
+    highest = minimum_of(jnp.where(derivative < 0.0, where_slack, jnp.inf))
     taut = jnp.where(jnp.all(offset > 0.0), jnp.inf, -jnp.inf)
     return Endpoint(
         offset,

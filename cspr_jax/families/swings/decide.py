@@ -31,6 +31,7 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model.limits import NO_LIMITS
@@ -119,7 +120,7 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Ar
         at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*problem, segment, jnp.asarray(arcs), t)))(
             jnp.asarray([0.0, 1.0])
         )
-        return jnp.min(at_ends, axis=0)
+        return minimum_of(at_ends, axis=0)
 
     return jax.vmap(one)(segments)
 

@@ -29,7 +29,7 @@ from jax import Array
 
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.swing_plane import swing_plane
-from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.elementary import maximum_of, sincospi
 from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model import point_mass
@@ -260,7 +260,7 @@ def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Arr
     """Left-hand side of (2.55); if it is positive, enough arcs make the segment feasible."""
     span = segment.end_radius - segment.start_radius
     ends = segment.start_radius + span * jnp.stack([amplitude.lowest, amplitude.highest]).astype(span.dtype)
-    return 1.0 - jnp.max(jnp.abs(ends)) * jnp.linalg.norm(segment.tilt)
+    return 1.0 - maximum_of(jnp.abs(ends)) * jnp.linalg.norm(segment.tilt)
 
 
 def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Float[Array, ""]) -> Float[Array, ""]:

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 
 Vector = Sequence[Array]
@@ -92,6 +93,8 @@ def largest(values: Sequence[Array]) -> Float[Array, "..."]:
 
 def smallest_of_each(arrays: Sequence[Array]) -> tuple[Float[Array, "..."], ...]:
     """The smallest of each of several arrays along the first axis; NaN stays NaN."""
+    if len(arrays) == 1:
+        return (minimum_of(arrays[0], axis=0),)
     nothing = [jnp.asarray(jnp.inf, array.dtype) for array in arrays]
     return tuple(lax.reduce(tuple(arrays), tuple(nothing), lambda a, b: tuple(map(jnp.minimum, a, b)), (0,)))
 

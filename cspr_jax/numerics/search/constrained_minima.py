@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 
 # A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
@@ -41,7 +42,7 @@ class Verified(NamedTuple):
 def _screened(parts: Parts, arguments: Any, points: Array) -> tuple[Array, Array]:
     def one(x):
         value, margins = parts(arguments, x)
-        return value, jnp.min(margins)
+        return value, minimum_of(margins)
 
     return jax.vmap(one)(points)
 

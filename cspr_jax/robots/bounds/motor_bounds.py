@@ -21,6 +21,7 @@ from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, flat, selected
 from cspr_jax.numerics.bounds.function_bounds import reciprocal
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.state_bounds import CableBounds
 from cspr_jax.robots.model.winches import STANDSTILL, Winches, radii
@@ -43,9 +44,9 @@ class Lines(NamedTuple):
     def smallest(self, axis: int) -> "Lines":
         """Lines around the smallest of several functions: above the line between the smallest values at both ends."""
         # Take the line above with the smallest largest value.
-        nearest = jnp.argmin(jnp.max(self.above, axis=0, keepdims=True), axis=axis, keepdims=True)
+        nearest = jnp.argmin(maximum_of(self.above, axis=0, keepdims=True), axis=axis, keepdims=True)
         above = jnp.take_along_axis(self.above, nearest, axis=axis)
-        return Lines(jnp.min(self.below, axis=axis), jnp.squeeze(above, axis=axis))
+        return Lines(minimum_of(self.below, axis=axis), jnp.squeeze(above, axis=axis))
 
 
 class MotorBounds(NamedTuple):
@@ -74,9 +75,9 @@ class MotorBounds(NamedTuple):
         may_act, can_act = self.may_act(), (self.speed * self.side).low() >= -STANDSTILL
         shape = (1,) * (lines.below.ndim - 2) + may_act.shape
         may_act, can_act = may_act.reshape(shape), (can_act & self.has_one_radius[None]).reshape(shape)
-        below = jnp.min(jnp.where(may_act, lines.below, jnp.inf), axis=-2)
+        below = minimum_of(jnp.where(may_act, lines.below, jnp.inf), axis=-2)
         certain = Lines(lines.below, jnp.where(can_act, lines.above, jnp.inf)).smallest(-2).above
-        possible = jnp.max(jnp.where(may_act, lines.above, -jnp.inf), axis=-2)
+        possible = maximum_of(jnp.where(may_act, lines.above, -jnp.inf), axis=-2)
         return Lines(below, jnp.where(can_act.any(-2), certain, possible))
 
 
@@ -189,4 +190,4 @@ def _lines(value: AffineBounds) -> Lines:
 def part_of(lines: Lines) -> tuple[Array, ...]:
     """Bounds of a slack by numbers, and rises of its lines; see `verification.bounds.block_slacks.BlockSlacks`."""
     below, above = lines
-    return jnp.min(below, axis=0), jnp.max(above, axis=0), below[1] - below[0], above[1] - above[0]
+    return minimum_of(below, axis=0), maximum_of(above, axis=0), below[1] - below[0], above[1] - above[0]

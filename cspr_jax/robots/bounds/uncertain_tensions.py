@@ -25,7 +25,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm, rotated
-from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.elementary import maximum_of, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions
@@ -76,7 +76,7 @@ def uncertain_tensions(
     sine = radii[0] / cables.length.low()
     tilt = jnp.where((sine >= 0.0) & (sine < 1.0), sine, jnp.nan) / jnp.sqrt(1.0 - sine**2)
     block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
-    centre = _centre_change(robot, state, inverse * unit[None], radii[1]) + SURPLUS * jnp.max(tensions.magnitude())
+    centre = _centre_change(robot, state, inverse * unit[None], radii[1]) + SURPLUS * maximum_of(tensions.magnitude())
     within, displaced = block.changes(inverse)
     maximum = _solution(within + displaced, displaced @ tensions.magnitude() + centre)
     down, up = maximum, maximum
@@ -104,7 +104,7 @@ class _UnitBlock(NamedTuple):
         # Bound changes of rows (m, dof) times the matrix, within the block and with displaced spools, (m, n_cables).
         dof, count = self.matrix.middle.shape
         left = jnp.abs(self.matrix.middle @ self.inverse - jnp.eye(dof))
-        rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
+        rounding = jnp.where(maximum_of(jnp.sum(left, axis=1)) < 0.5 * SURPLUS, SURPLUS, jnp.nan)
         radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
         within = jnp.abs(rows @ self.matrix.linear) + jnp.abs(rows) @ radius
         directions = rotated(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
@@ -123,7 +123,7 @@ def _closer(block: _UnitBlock, displaced: Array, rest: Array, minimum: Array, ce
 def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
     # Bound weighted sums of the tensions, none below 0, of any robot within the uncertainty; NaN: no bound was found.
     shape, weights = weights.shape[:2], weights.reshape(-1, weights.shape[2])
-    high, floor = block.tensions.high(), SURPLUS * jnp.max(weights, axis=1, keepdims=True)
+    high, floor = block.tensions.high(), SURPLUS * maximum_of(weights, axis=1, keepdims=True)
 
     def corrected(_, more: Array) -> Array:
         return sum(block.changes((weights + more) @ block.inverse)) * (1.0 + SPARE) + floor

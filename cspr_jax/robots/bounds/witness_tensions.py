@@ -22,7 +22,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, rotated, rounded, squares
-from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.nearest_face import NearestFace, nearest_face
@@ -49,12 +49,12 @@ class WitnessTensions(NamedTuple):
     @property
     def margin_low(self) -> Array:
         """Lower bound of the largest distance of tensions from their limits, at all times, N."""
-        return self.below.min(-1)
+        return minimum_of(self.below, axis=-1)
 
     @property
     def margin_high(self) -> Array:
         """Upper bound of the largest distance of tensions from their limits, at all times, N."""
-        return self.above.max(-1)
+        return maximum_of(self.above, axis=-1)
 
 
 def witness_tensions(
@@ -73,7 +73,7 @@ def witness_tensions(
     inverse = right_inverse(matrix.middle)
     if count == dof:
         tension, is_regular = _solution(matrix, inverse, wrench, jnp.zeros(count), jnp.zeros(count))
-        smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
+        smallest = minimum_of(jnp.minimum(tension.high() - low, high - tension.low()))
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
         matrices, wrenches = (
@@ -82,21 +82,21 @@ def witness_tensions(
         lows, highs = (jnp.broadcast_to(side, (2, count)) for side in (low, high))
         faces = jax.vmap(nearest_face)(matrices, wrenches, lows, highs)
         before, after = faces.tensions
-        nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - lows, highs - faces.tensions), axis=1))
+        nearer = jnp.argmin(minimum_of(jnp.minimum(faces.tensions - lows, highs - faces.tensions), axis=1))
         face = jax.tree.map(lambda array: array[nearer], faces)
         back = inverse if matrix.square is None else _central_inverse(matrix.middle, face, inverse)
         tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
         above = _face_margin(matrix, inverse, wrench, outer or (lows, highs), face)
-        low, high = jnp.max(lows, axis=0), jnp.min(highs, axis=0)
+        low, high = maximum_of(lows, axis=0), minimum_of(highs, axis=0)
     if tension.square is not None:
-        minimum = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
+        minimum = minimum_of(jnp.minimum(tension.low() - low, high - tension.high()))
         below = jnp.broadcast_to(jnp.where(is_regular, minimum, -jnp.inf), (2,))
         return WitnessTensions(tension, below, above, is_regular, inverse)
     # The minimum of several lines is a concave function, above the line between its values at both ends.
     if count == dof:
         lows, highs = (jnp.broadcast_to(side, (2, count)) for side in (low, high))
     lines = jnp.stack([tension.middle - tension.linear, tension.middle + tension.linear])
-    below = jnp.min(jnp.minimum(lines - lows, highs - lines) - tension.radius[None], axis=1)
+    below = minimum_of(jnp.minimum(lines - lows, highs - lines) - tension.radius[None], axis=1)
     return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
 
 
@@ -135,8 +135,8 @@ def _solution(
         sums += jnp.abs(matrix.square @ inverse)
     residual = (right - rotated(matrix, line)).magnitude()
     sums = jnp.sum(sums + matrix.radius @ jnp.abs(inverse), axis=1)
-    fraction = jnp.max(sums, initial=0.0)
-    radius = jnp.abs(inverse) @ (residual + sums * jnp.max(residual, initial=0.0) / (1.0 - fraction))
+    fraction = maximum_of(sums, initial=0.0)
+    radius = jnp.abs(inverse) @ (residual + sums * maximum_of(residual, initial=0.0) / (1.0 - fraction))
     is_known = (fraction < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(linear).all() & jnp.isfinite(radius).all()
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 
@@ -158,7 +158,7 @@ def _face_margin(
     ends = jnp.where(is_bounded[None], ends, 0.0)
     limit = rounded(AffineBounds(0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]), jnp.zeros(count)))
     over = jnp.where(is_inward, -along.low(), along.high())
-    span = jnp.maximum(jnp.max(high - low, axis=0), 0.0)
+    span = jnp.maximum(maximum_of(high - low, axis=0), 0.0)
     other = jnp.where(over > FLAT * jnp.abs(along.middle), over * span, 0.0)
     slack = dot(normal, wrench) - dot(along, limit)
     top = slack.middle + slack.radius + jnp.maximum(squares(slack), 0.0) + jnp.sum(other)
@@ -169,5 +169,5 @@ def _face_margin(
     is_bound = is_normal & is_bounded.all() & (norm > 0.0).all() & jnp.isfinite(ends).all()
     above = jnp.where(is_bound, ends / jnp.where(is_bound, norm, 1.0), jnp.inf)
     halves = 0.5 * (high - low)
-    half = halves[:, jnp.argmin(jnp.max(halves, axis=0))]
-    return jnp.where(jnp.max(above) < jnp.max(half), above, half)
+    half = halves[:, jnp.argmin(maximum_of(halves, axis=0))]
+    return jnp.where(maximum_of(above) < maximum_of(half), above, half)

@@ -21,6 +21,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm_squared
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import nearest
 
@@ -117,7 +118,7 @@ def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBou
 def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
     """Smallest component of vectors along a turning direction."""
     middle, turn = line.middle, line.linear
-    low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
+    low = minimum_of(dot(line.each(lambda x: x[None]), vectors).low())
     length = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
     return jnp.where(low > 0.0, low * (1.0 - DISTANCE_ERROR) / length, -jnp.inf)
 
@@ -133,7 +134,7 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
     part = inner_fractions(start.middle, end.middle, planes)[:, None]
     points = start * (1.0 - part) + end * part
     heights = dot(points.each(lambda x: x[:, None]), planes.normals[None]) - planes.offsets[None]
-    minimum = jnp.min(jnp.max(heights.high(), axis=1))
+    minimum = minimum_of(maximum_of(heights.high(), axis=1))
     return jnp.where(minimum < 0.0, minimum, jnp.inf)
 
 
@@ -143,8 +144,8 @@ def inner_fractions(
     """Midpoints, as fractions of edges, of the parts of edges that are behind all planes."""
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
-    first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
-    last = jnp.min(jnp.where(low > high, meet, 1.0), axis=1)
+    first = maximum_of(jnp.where(low < high, meet, 0.0), axis=1)
+    last = minimum_of(jnp.where(low > high, meet, 1.0), axis=1)
     return jnp.clip(0.5 * (jnp.clip(first, 0.0, 1.0) + jnp.clip(last, 0.0, 1.0)), 0.0, 1.0)
 
 

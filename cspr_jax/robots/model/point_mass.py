@@ -17,7 +17,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import PointOfEachCable, Positive
-from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.elementary import as_float64, maximum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -227,7 +227,7 @@ def rest_point(z0):
 @jax.jit
 def spool_radius(robot: Robot) -> Float[Array, ""]:
     """Largest distance of a spool from the centroid of all spools."""
-    return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
+    return maximum_of(jnp.linalg.norm(robot.base_points, axis=1))
 
 
 def in_one_plane(robot: PointMassRobot) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import as_float64, double_precision
+from cspr_jax.numerics.elementary import as_float64, double_precision, maximum_of
 from cspr_jax.numerics.linear.lanes import about_axis
 from cspr_jax.numerics.linear.rotations import about_vertical
 from cspr_jax.numerics.shapes import Float
@@ -148,7 +148,7 @@ def _traced(robot: PlatformRobot) -> Any:
         both.append((nearness, jnp.where(nearness > ALIGNED * one, about_z, jnp.eye(3)) @ side))
     (first, rotation), (second, other) = both
     chosen = jnp.where(first >= second, rotation, other)
-    return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
+    return jnp.where(maximum_of(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
 
 
 def _to_vertical(normal: np.ndarray) -> np.ndarray:

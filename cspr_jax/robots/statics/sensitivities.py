@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.elementary import maximum_of, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.robot import Robot, check_determined
@@ -76,4 +76,4 @@ def _largest(rows: Array) -> Array:
     # Opposite corners give the same length, so that the last sign is kept.
     count = rows.shape[1]
     signs = np.array([(*corner, 1.0) for corner in itertools.product((-1.0, 1.0), repeat=count - 1)])
-    return jnp.max(jnp.linalg.norm(signs @ rows.T, axis=1))
+    return maximum_of(jnp.linalg.norm(signs @ rows.T, axis=1))

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.elementary import as_float64, maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration
@@ -63,7 +63,7 @@ class Faces:
     def margin(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
         """Distance to the nearest face."""
         slacks = self.slacks(values)
-        minimum, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
+        minimum, spanned = minimum_of(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
         flat = jnp.where(spanned, jnp.minimum(minimum, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
         return jnp.where(self.is_regular, minimum, flat)
 
@@ -73,11 +73,11 @@ class Faces:
         offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
         each = SLACK_ERROR * (magnitude + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
         finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
-        smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
+        smallest = minimum_of(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
         # Only faces that may be the nearest one matter.
         each = each / jnp.where(finite, self.volumes, 1.0)
         near = finite & (self.slacks(values) - each <= smallest + each)
-        return jnp.max(jnp.where(near, each, 0.0), axis=-1)
+        return maximum_of(jnp.where(near, each, 0.0), axis=-1)
 
 
 @functools.cache
@@ -147,7 +147,7 @@ def one_sided_faces(
     else:
         after, last = rows[:, np.array([1, 2, 0])], rows[:, np.array([2, 0, 1])]
         along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
-    norm = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+    norm = maximum_of(jnp.abs(along), axis=1, keepdims=True)
     along = jnp.where(norm > FLAT, along / jnp.where(norm > FLAT, norm, 1.0), 0.0)
     return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
 
@@ -181,8 +181,8 @@ def wrench_faces(
     both = jnp.concatenate([along, -along])
     offsets = _offset(both, tension_min, tension_max)
     bounds = jnp.concatenate([spans, spans]) & jnp.isfinite(offsets)
-    farthest = jnp.max(jnp.where(np.concatenate([is_own, is_own]), -jnp.inf, both), axis=1)
-    emptier = jnp.min(jnp.where(jnp.concatenate([spans, spans]), farthest, jnp.inf))
+    farthest = maximum_of(jnp.where(np.concatenate([is_own, is_own]), -jnp.inf, both), axis=1)
+    emptier = minimum_of(jnp.where(jnp.concatenate([spans, spans]), farthest, jnp.inf))
     return Faces(
         normals=jnp.where(bounds[:, None], jnp.concatenate([units, -units]), 0.0),
         offsets=jnp.where(bounds, offsets, -jnp.inf),

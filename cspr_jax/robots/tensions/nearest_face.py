@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import beside_faces, face_distances, one_sided_faces, spanning
 from cspr_jax.robots.tensions.tension_distribution import all_tensions
@@ -45,7 +45,7 @@ def nearest_face(
     """Find the face nearest to a wrench, and the most central tensions."""
     dof, count = matrix.shape
     solutions = all_tensions(matrix, wrench)
-    cap = CAP * (jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(low))
+    cap = CAP * (maximum_of(jnp.abs(solutions.min_norm)) + maximum_of(low))
     low, high = jnp.asarray(low), jnp.minimum(high, jnp.maximum(cap, low))
     chosen = beside_faces(count, dof)
     along = one_sided_faces(matrix, solutions.kernel)
@@ -56,7 +56,9 @@ def nearest_face(
     span = high - low
     # If the range of a cable, and not a face, bounds the distance, distances are proportional to the cables' ranges.
     weights = jnp.where(
-        jnp.min(face_distances(along, slacks, jnp.ones(along.shape))) > 0.5 * jnp.min(span), span / jnp.max(span), 1.0
+        minimum_of(face_distances(along, slacks, jnp.ones(along.shape))) > 0.5 * minimum_of(span),
+        span / maximum_of(span),
+        1.0,
     )
     index = jnp.argmin(face_distances(along, slacks, weights[others]))
     at, product = jnp.asarray(others)[index], along[index]

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, solved
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
@@ -115,7 +115,7 @@ def keeps(
     tensions: Float[Array, "n_cables"], low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
 ) -> Bool[Array, ""]:
     """Tell whether tensions keep their limits, to 1e-9 of the largest."""
-    return jnp.max(jnp.abs(beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
+    return maximum_of(jnp.abs(beyond(tensions, low, high))) <= WITHIN * maximum_of(jnp.abs(tensions))
 
 
 def beyond(tensions: Float[Array, "..."], low: Float[Array, "..."], high: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -129,7 +129,7 @@ def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof
     if count < dof:
         raise InputError("matrix", None, f"must be {dof} or more, one a cable", problem=f"{count} columns")
     frame, along, left = _frame(matrix, wrench)
-    return AllTensions(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
+    return AllTensions(along[:dof] @ frame[:dof], frame[dof:], minimum_of(left[:dof]) > FLAT * maximum_of(left[:dof]))
 
 
 def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
@@ -170,8 +170,8 @@ def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
         return _at_limits(solutions, low, high, _limits_reached(solutions, low, high))
     points, is_point = _candidates(solutions, low, high)
     tensions = solutions.min_norm[None] + points @ solutions.kernel
-    excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
-    is_within = is_point & (excess <= TENSION_ERROR * jnp.max(jnp.abs(tensions), axis=1))
+    excess = maximum_of(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
+    is_within = is_point & (excess <= TENSION_ERROR * maximum_of(jnp.abs(tensions), axis=1))
     # If only one point is feasible, rounding may exclude it: then take the smallest violation.
     worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
@@ -225,8 +225,8 @@ def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
 
     def is_open(search):
         tensions = solutions.tensions(search.point)
-        worst = jnp.max(jnp.abs(beyond(tensions, low, high)))
-        is_beyond = worst > TENSION_ERROR * jnp.max(jnp.abs(tensions))
+        worst = maximum_of(jnp.abs(beyond(tensions, low, high)))
+        is_beyond = worst > TENSION_ERROR * maximum_of(jnp.abs(tensions))
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
     none, no = jnp.zeros(count), jnp.asarray(False)
@@ -294,7 +294,7 @@ def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTens
     """Largest distance r from limits, () N: the minimum of half of each cable's range and of what each face allows."""
     dof, count = matrix.shape
     if count == dof:
-        return jnp.min(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))
+        return minimum_of(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))
     others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
 
     def slack(along, cables):
@@ -310,4 +310,4 @@ def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTens
     along = jnp.where(is_face, both[nearest], 0.0)
     norm = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
     distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / norm, jnp.inf)
-    return jnp.minimum(distance, 0.5 * jnp.min(high - low))
+    return jnp.minimum(distance, 0.5 * minimum_of(high - low))

@@ -18,7 +18,7 @@ from jax import Array, lax
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import double_precision, solved
+from cspr_jax.numerics.elementary import double_precision, maximum_of, minimum_of, solved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.tensions.tension_distribution import (
@@ -95,7 +95,7 @@ def improved_closed_form(
         excess = beyond(solutions.tensions(point), tension_min, tension_max)
         free = jnp.where(sides == 0.0, jnp.abs(excess), 0.0)
         worst = jnp.argmax(free)
-        is_worst = (jnp.arange(count) == worst) & (free[worst] > TENSION_ERROR * jnp.max(tension_max))
+        is_worst = (jnp.arange(count) == worst) & (free[worst] > TENSION_ERROR * maximum_of(tension_max))
         sides = jnp.where(is_worst, jnp.sign(excess), sides)
         limits = jnp.where(sides > 0.0, tension_min, tension_max)
         offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.min_norm)
@@ -128,7 +128,9 @@ def p_norm(
     are then reached to 1e-10, weakly active ones to the square root of the weight.
     """
     solutions = all_tensions(matrix, wrench)
-    magnitude = jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
+    magnitude = (
+        maximum_of(jnp.abs(solutions.min_norm)) + maximum_of(jnp.abs(tension_min)) + maximum_of(jnp.abs(reference))
+    )
     largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * magnitude)
     start, slack = centred(matrix, wrench, tension_min, largest)
     # If only one point is feasible, that point is the result.
@@ -145,7 +147,7 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
     freedom = solutions.kernel.shape[0]
     if freedom == 0:
         return start
-    scale = jnp.max(jnp.abs(start - reference))
+    scale = maximum_of(jnp.abs(start - reference))
     scale = jnp.where(scale > 0.0, scale, 1.0)
     has_largest = jnp.isfinite(high)
 
@@ -180,7 +182,7 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
             jnp.where(has_largest, below / jnp.where(direction > 0.0, direction, 1.0), jnp.inf),
             above / jnp.where(direction < 0.0, -direction, 1.0),
         )
-        free = jnp.min(jnp.where(direction > 0.0, up, jnp.where(direction < 0.0, down, jnp.inf)))
+        free = minimum_of(jnp.where(direction > 0.0, up, jnp.where(direction < 0.0, down, jnp.inf)))
         lengths = jnp.minimum(1.0, LONGEST_STEP * free) * 0.5 ** np.arange(LENGTHS)
         tried = tensions[None] + (scale * lengths)[:, None] * direction[None]
         values = jax.vmap(value, (0, None))(tried, weight)

@@ -19,6 +19,7 @@ from cspr_jax.motion.limits import limits_set, motor_limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
 from cspr_jax.numerics.bounds.function_bounds import changes_sign, determinant, magnitude_range
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.motor_bounds import motor_bounds, motor_slack, part_of, tension_lines
@@ -108,7 +109,7 @@ def _kernel(
             corners = platform_corners(robot, bodies)
             if limits.floor is not None and corners is not None:
                 heights = -corner_depths(corners, state) + limits.floor
-                parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
+                parts.append((minimum_of(heights.low(), keepdims=True), minimum_of(heights.high(), keepdims=True)))
         return _joined(parts)
 
     return jax.vmap(one)(states)

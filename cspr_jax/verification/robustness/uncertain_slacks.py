@@ -22,7 +22,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, norm
-from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.elementary import as_float64, minimum_of
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, attachments, balance_bounds, cable_bounds
@@ -114,9 +114,9 @@ def _cable_slacks(
         return uncertain_tensions(other, state, cables, (low, high), (radii.spools, radii.centre))
 
     tensions = jax.vmap(at_mass)(jnp.stack([1.0 / radii.factor, radii.factor]))
-    parts = [jnp.min(tensions.low - low[None], axis=0)]
-    parts += [] if limits.tension_max is None else [jnp.min(high[None] - tensions.high, axis=0)]
-    parts = [jnp.min(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
+    parts = [minimum_of(tensions.low - low[None], axis=0)]
+    parts += [] if limits.tension_max is None else [minimum_of(high[None] - tensions.high, axis=0)]
+    parts = [minimum_of(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
     maximum = _largest(robot, limits, state, cables, radii.spools)
     for row in limits_set(limits):
         if row.quantity != "tension":

@@ -21,6 +21,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
@@ -129,8 +130,8 @@ def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
         planes = FacePlanes(shape.planes.normals, shape.planes.offsets + shape.planes.normals @ cell.position)
         solids = jax.tree.map(lambda array: array[None], placed)
         parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, shape.edges, shape.faces), planes))
-    low, high = (jnp.min(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
-    allowance = DISTANCE_ERROR * (bodies.extent + jnp.max(jnp.abs(cell.position)))
+    low, high = (minimum_of(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
+    allowance = DISTANCE_ERROR * (bodies.extent + maximum_of(jnp.abs(cell.position)))
     return low - allowance, high + allowance
 
 
@@ -163,11 +164,11 @@ def _gap(first: Solid, second: Solid) -> Range:
         + smallest_quadratic(quadratic)
         - longest * between.radius
     )
-    low = jnp.min(low)
+    low = minimum_of(low)
     weights = nearest_weights(features, p.middle, q.middle)
     nearest = q.weighted(weights[1][None]).minus(p.weighted(weights[0][None]))
     ends = nearest.middle + SIGNS @ nearest.jacobian[0].T
-    high = jnp.max(jnp.sqrt(jnp.sum(ends**2, axis=1))) + nearest.radius[0]
+    high = maximum_of(jnp.sqrt(jnp.sum(ends**2, axis=1))) + nearest.radius[0]
     return jnp.where(low > 0.0, low / longest, -jnp.inf), high
 
 
@@ -181,7 +182,7 @@ def _depth(body: Solid, planes: FacePlanes) -> Array:
     points = body.corners.weighted(weights)
     heights = points.middle @ planes.normals.T - planes.offsets[None] + points.radius[:, None]
     heights = heights + jnp.sum(jnp.abs(jnp.einsum("fi,mik->mfk", planes.normals, points.jacobian)), axis=-1)
-    deepest = jnp.min(jnp.max(heights, axis=1))
+    deepest = minimum_of(maximum_of(heights, axis=1))
     return jnp.where(deepest < 0.0, deepest, jnp.inf)
 
 

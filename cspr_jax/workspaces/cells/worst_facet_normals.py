@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_sets import normals_to, spanning
 
@@ -64,18 +65,18 @@ def worst_facets(
         normals = jnp.ones((1, 1)) if dof == 1 else normals_to(matrix)
         along = jnp.where(is_own, 0.0, normals @ matrix)
         normals, along = jnp.concatenate([normals, -normals]), jnp.concatenate([along, -along])
-        largest = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+        largest = maximum_of(jnp.abs(along), axis=1, keepdims=True)
         beside = jnp.sum(jnp.linalg.norm(normals[:, None] * spreads[None], axis=2), axis=1)
         products = normals @ wrenches.T + beside[:, None]
         if condition == "closure":
             others = jnp.where(np.concatenate([is_own, is_own]), jnp.inf, along)
-            value = -jnp.min(others, axis=1)
+            value = -minimum_of(others, axis=1)
             is_void, load = jnp.zeros(value.shape, bool), jnp.asarray(0)
         else:
             support = jnp.sum(
                 jnp.where(along > 0.0, along * jnp.where(free, 0.0, high)[None], along * low[None]), axis=1
             )
-            value = support - jnp.max(products, axis=1)
+            value = support - maximum_of(products, axis=1)
             is_void = ((along > ZERO * largest) & free[None]).any(1)
         is_void = is_void | ~(largest[:, 0] > SHORT)
         value = jnp.where(value > 0.0, value / jnp.linalg.norm(normals, axis=1), value)

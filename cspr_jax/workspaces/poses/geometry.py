@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.numerics.linear import lanes
 from cspr_jax.numerics.linear.lanes import Vector
 from cspr_jax.numerics.linear.rotations import matrix
@@ -81,7 +82,7 @@ def _inverse_lengths(robot: AnyRobot, position: Vector, arms: Vector | None) -> 
 @jax.jit
 def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Array) -> tuple[Vector, Array]:
     target, ray = _rays(robot, position, arms)
-    far = jnp.max(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
+    far = maximum_of(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
     loss = jnp.maximum(1.0, far * lanes.largest(list(inverse)))
     if robot.pulleys is None:
         return tuple(x * inverse for x in ray), loss

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.linear.lanes import largest
 from cspr_jax.numerics.shapes import Float, Shaped
 from cspr_jax.workspaces.poses import margins
@@ -126,7 +127,7 @@ def _smallest_margin(
 
     largest_one = jnp.inf * jnp.ones_like(template)
     if measure == "tensions":  # margins are at most half of a cable's range
-        largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(tension_limits.high - tension_limits.low))
+        largest_one = jnp.minimum(largest_one, 0.5 * minimum_of(tension_limits.high - tension_limits.low))
     count = len(table)
     start = lax.complex(largest_one, largest_one)
     return lax.scan(step, start, (table, limits), unroll=count if count <= UNROLLED else 1)[0]

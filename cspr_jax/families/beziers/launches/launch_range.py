@@ -24,6 +24,7 @@ from cspr_jax.maps.releases import Releases
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.search.differential_evolution import evolved
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -102,7 +103,7 @@ def _energy(
     # Return the kinetic energy at the release over weight and radius of the robot, and the smallest margin.
     robot, shot = problem_and_bounds[0].robot, _shot(problem_and_bounds, question, x)
     margins = margins_of(problem_and_bounds[0], jax.tree.map(lambda x: jnp.asarray(x)[None], shot.motion), SAMPLES)
-    return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
+    return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), minimum_of(margins)
 
 
 @jax.jit

@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.families.paths.least_time.motor_bounds import LinearBounds, MotorTensions, ReferenceMotion, motor_tensions
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.bounds.witness_tensions import right_inverse
@@ -105,7 +106,7 @@ def path_half_planes(
         both = (jnp.concatenate([side, -side]) for side in (rate, acceleration))
         parts.append((*both, *[jnp.concatenate([maximum, maximum])] * 2))
     if limits.cable_speed_max is not None:
-        cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
+        cap = jnp.minimum(cap, minimum_of(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if limits.acceleration_max is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
     if reference is not None:

@@ -30,6 +30,7 @@ from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.nodes import PathPoints, points_on, state_at
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, norm_squared, rotated, squared
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
@@ -243,7 +244,7 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
     if DOWN in PATTERNS[robot.pattern].forces:
         upward = -matrix.high()[PATTERNS[robot.pattern].forces.index(DOWN)]
         gains = jnp.where(is_bounded, 0.0, products.high())
-        lack = jnp.max(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
+        lack = maximum_of(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
     if PATTERNS[robot.pattern].along_line:
         momentum_rate = momentum_rate - _turning_axes(robot, accelerated, cables) * unit
     return _along(*ends, cell.width, momentum, momentum_rate), support - (held.middle - held.radius), lack

@@ -14,6 +14,7 @@ from cspr_jax.families.platforms.platform_segment import PlatformMotion, Platfor
 from cspr_jax.motion.limits import other_slacks
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.interference import cable_directions, gaps
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -50,7 +51,7 @@ def samples_of(
         motion = PlatformMotion(segment, problem.amplitude, arcs, kind)
         state = motion.state(tau)
         distances = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
-        nearest = jnp.min(distances, initial=jnp.inf)
+        nearest = minimum_of(distances, initial=jnp.inf)
         slacks = jnp.stack([*other_slacks(robot, limits, state, motion.z0), nearest])
         return PoseSamples(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
 

@@ -19,6 +19,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.linear.lanes import dot
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.statics.wrench_lanes import CABLES, CableLanes, cable_rates
@@ -137,7 +138,7 @@ def _tension_slacks(enclosed: Enclosed, limit: Array, is_lower: bool) -> Pair:
         attained, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
     else:
         attained, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
-    return jnp.min(attained, axis=1), jnp.min(bound, axis=(0, 1))
+    return minimum_of(attained, axis=1), minimum_of(bound, axis=(0, 1))
 
 
 def _rates(node: Node) -> list[tuple[Array, Array, Array]]:
@@ -162,7 +163,7 @@ def _speed_bounds(cable: CableEllipseBounds, limit: Array) -> list[Array]:
 
 
 def _speed_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
-    return jnp.min(enclosed.nodes[1], axis=1), jnp.min(enclosed.coefficients[0], axis=(0, 1))
+    return minimum_of(enclosed.nodes[1], axis=1), minimum_of(enclosed.coefficients[0], axis=(0, 1))
 
 
 def _of_mass_centre(vector, largest: Array) -> list[Pair]:
@@ -198,7 +199,7 @@ def _acceleration_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
     worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
     # Take accelerations as close to zero as rounding allows.
     accelerations = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
-    return jnp.min(over[:, ::2] - accelerations, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
+    return minimum_of(over[:, ::2] - accelerations, axis=1), minimum_of(low[:, ::2] - worst, axis=(0, 1))
 
 
 # Keys are the names of quantities in the rows of `schema.limits`.

@@ -23,6 +23,7 @@ from cspr_jax.families.platforms.six_cable_proof.work_list import smallest_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.linear.lanes import Vector, dot, largest, materialized, rotated_back, smallest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts import interference_lanes
@@ -126,10 +127,10 @@ def pose_blocks(
         attained, offset = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
     else:
         attained, offset = smallest_nodes(nodes, len(nodes) - 1, OFFSETS)
-    extent = jnp.max(jnp.abs(problem.robot.base_points)) + segments.center[:, 2]
+    extent = maximum_of(jnp.abs(problem.robot.base_points)) + segments.center[:, 2]
     return PoseBounds(
-        jnp.min(jnp.real(first), axis=0) - POSE_ERROR * extent,
-        jnp.stack([jnp.min(x, axis=0) - step - POSE_ERROR for x, step in zip(nodes[:-1], steps, strict=True)]),
+        minimum_of(jnp.real(first), axis=0) - POSE_ERROR * extent,
+        jnp.stack([minimum_of(x, axis=0) - step - POSE_ERROR for x, step in zip(nodes[:-1], steps, strict=True)]),
         attained,
         offset,
         jnp.stack(deviations),
@@ -210,7 +211,7 @@ def _steps(problem: Problem, segments: PlatformSegment, deviations: _Deviations)
         if limit.quantity == "depth":
             # The mass centre oscillates in a plane: on level paths its depth is constant.
             steep = jnp.sqrt(jnp.sum(segments.plane[:, 2] ** 2, axis=1))
-            steps.append((steep * deviations.centre + jnp.max(arms) * deviations.arm) * factor / unit)
+            steps.append((steep * deviations.centre + maximum_of(arms) * deviations.arm) * factor / unit)
         else:
             steps.append(largest([(deviations.centre + arms[k] * deviations.arm) / allowed[k] for k in range(CABLES)]))
     return steps

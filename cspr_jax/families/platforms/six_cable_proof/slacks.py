@@ -22,6 +22,7 @@ from cspr_jax.families.platforms.platform_segment_lanes import PhaseLanes, State
 from cspr_jax.motion.limits import limits_set, scales, slack, values
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.linear.lanes import dot, largest, smallest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import Limits
@@ -55,7 +56,7 @@ def pose_slacks(
     robot, limits = problem.robot, problem.limits
     per_length = wrench_balance.tensions_per_length(robot, state)
     basic = [
-        robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
+        robot.n_cables * z0 / robot.gravity * minimum_of(per_length),
         wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
         plane_normal(robot) @ state.position / z0,
     ]
@@ -64,7 +65,7 @@ def pose_slacks(
         return jnp.stack(basic)
     quantities, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
     slacks = (slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale) for row in limit_rows)
-    return jnp.stack([*basic, *(jnp.min(x) for x in slacks)])
+    return jnp.stack([*basic, *(minimum_of(x) for x in slacks)])
 
 
 # If the volume of three of the cables over the product of their lengths is below this, they lie nearly in one plane.

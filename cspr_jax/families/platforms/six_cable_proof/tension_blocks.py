@@ -44,6 +44,7 @@ from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.linear import packed_arrays
 from cspr_jax.numerics.linear.lanes import dot, materialized
 from cspr_jax.numerics.shapes import Float
@@ -134,7 +135,7 @@ def tension_ranges(problem: Problem, one: Float[Array, ""], items, *, kind: Plat
     low, high = (_coefficients(interpolated.values) + sign * interpolated.remainders[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
     minimum, maximum = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
-    return TensionRange(jnp.min(minimum, axis=0), -jnp.min(maximum, axis=0), *_allowances(interpolated))
+    return TensionRange(minimum_of(minimum, axis=0), -minimum_of(maximum, axis=0), *_allowances(interpolated))
 
 
 def _coefficients(values: Array) -> Array:
@@ -144,7 +145,7 @@ def _coefficients(values: Array) -> Array:
 
 
 def _allowances(interpolated: "_Interpolated") -> tuple[Array, Array]:
-    return jnp.max(interpolated.rounding[:CABLES], axis=0), jnp.max(interpolated.remainders[:CABLES], axis=0)
+    return maximum_of(interpolated.rounding[:CABLES], axis=0), maximum_of(interpolated.remainders[:CABLES], axis=0)
 
 
 class _Interpolated(NamedTuple):
@@ -191,11 +192,11 @@ def _interpolated(
 
     factors = np.append(chebyshev.remainders(radii), NODE_ERROR)
     magnitudes = jnp.stack(packed_arrays.parts(lax.map(magnitudes_on, (axes[:, 0], lax.map(bounds_on, axes), factors))))
-    amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
-    largest = jnp.max(jnp.abs(values[:, : len(magnitudes)]), axis=0)
+    amplified = maximum_of(values[:, REGULAR + 1], axis=0) ** 1.5
+    largest = maximum_of(jnp.abs(values[:, : len(magnitudes)]), axis=0)
     largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # three cables in one plane
     rounding = magnitudes[:, -1] * amplified[None] + COEFFICIENTS * largest
-    remainders = jnp.min(magnitudes[:, :-1], axis=1) + rounding
+    remainders = minimum_of(magnitudes[:, :-1], axis=1) + rounding
     if single_precision:
         remainders = remainders + chebyshev.LEBESGUE * packed_arrays.SINGLE_ERROR * largest
     return _Interpolated(block, values, remainders, rounding)
@@ -303,11 +304,11 @@ def _bounds(problem: Problem, interpolated: _Interpolated) -> tuple[list[Array],
     one = slice(REGULAR, REGULAR + 1)
     regular, fraction = around(coefficients, remainders, one), around(values, interpolated.rounding, one)
     # Quotients with the same denominator are smallest for the smallest numerator.
-    minimum = jnp.min(coefficients[:, :CABLES] - remainders[None, :CABLES], axis=1, keepdims=True)
-    doubt = jnp.max(interpolated.rounding[None, :CABLES], axis=1, keepdims=True)
-    kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
+    minimum = minimum_of(coefficients[:, :CABLES] - remainders[None, :CABLES], axis=1, keepdims=True)
+    doubt = maximum_of(interpolated.rounding[None, :CABLES], axis=1, keepdims=True)
+    kappa = minimum_of(values[:, :CABLES], axis=1, keepdims=True) + doubt
     nodes = [at_most(kappa, fraction)[:, 0], fraction[1][:, 0]]
-    bound = [jnp.min(ratio(minimum, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
+    bound = [minimum_of(ratio(minimum, regular), axis=(0, 1)), minimum_of(regular[0], axis=(0, 1))]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
     part, slacks = slice(0, REGULAR + 2), {}
     for quantity, limits in _quantities(problem).items():

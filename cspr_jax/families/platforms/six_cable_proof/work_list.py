@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.elementary import minimum_of
 from cspr_jax.numerics.linear.lanes import smallest
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
@@ -133,6 +134,6 @@ def smallest_nodes(
 ) -> tuple[Float[Array, "1 n_criteria n"], Float[Array, "n"]]:
     """Reduce the node values of n blocks to the few numbers that a verdict needs; slacks come first."""
     worst = smallest(list(nodes[:n_slacks]))
-    is_there = worst == jnp.min(worst, axis=0)[None]
-    first = jnp.min(jnp.where(is_there, offsets[:, None], jnp.inf), axis=0)
-    return jnp.stack([jnp.min(x, axis=0) for x in nodes])[None], jnp.where(first <= 1.0, first, jnp.nan)
+    is_there = worst == minimum_of(worst, axis=0)[None]
+    first = minimum_of(jnp.where(is_there, offsets[:, None], jnp.inf), axis=0)
+    return jnp.stack([minimum_of(x, axis=0) for x in nodes])[None], jnp.where(first <= 1.0, first, jnp.nan)

@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.numerics.elementary import maximum_of
 from cspr_jax.numerics.shapes import Float, Int, Num
 
 # Number of intervals between the samples of one block.
@@ -58,4 +59,4 @@ def over_blocks(
         at = row[None] + jnp.minimum(later, count[None] - 1)
         return step(state, flat[at], flat[at + 1])
 
-    return lax.fori_loop(0, (jnp.max(count) + (together - 1)) // together, body, first)
+    return lax.fori_loop(0, (maximum_of(count) + (together - 1)) // together, body, first)

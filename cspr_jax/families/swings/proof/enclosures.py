@@ -16,6 +16,7 @@ from cspr_jax.families.swings.proof.limit_slacks import motion_bounds
 from cspr_jax.families.swings.proof.slacks import interval_bounds, row_bounds, swing_state, taut_bounds
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Num
 from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
 from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates, largest_moves
@@ -52,7 +53,7 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
     step = (2.0 * half / INTERVALS) ** 2 / 8.0
     kappa, taut = jnp.stack(states.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
     level = row_bounds(segment, arcs, over, segment.tilt).curvature * step
-    eta = jnp.min(states.eta) - level, jnp.max(states.eta) + level
+    eta = minimum_of(states.eta) - level, maximum_of(states.eta) + level
     scale = segment.rate / robot.base_points.shape[0]
 
     def fraction(top, is_low):
@@ -66,8 +67,8 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
         position[None] - robot.base_points,
         velocity,
         acceleration,
-        fraction(jnp.min(kappa, axis=0) - taut, True),
-        fraction(jnp.max(kappa, axis=0) + taut, False),
+        fraction(minimum_of(kappa, axis=0) - taut, True),
+        fraction(maximum_of(kappa, axis=0) + taut, False),
         0.5 * half * half * position_bounds.curvature,
         half * position_bounds.curvature / time,
         half * acceleration_bounds.derivative / time**2,

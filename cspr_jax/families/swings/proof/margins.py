@@ -21,7 +21,7 @@ from cspr_jax.families.swings.proof.criteria import BASIC, counts, smooth_slacks
 from cspr_jax.families.swings.proof.verdicts import OF_PLANS, SMALL, length
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import vertex
+from cspr_jax.numerics.elementary import minimum_of, vertex
 from cspr_jax.numerics.linear.lanes import materialized, smallest_of_each
 from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -125,8 +125,8 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, times: Array) -> 
         values, where = (x[:, columns].reshape(CANDIDATES * n, -1) for x in (estimates, times))
         number = jnp.broadcast_to(jnp.arange(CANDIDATES * n)[:, None], values.shape)
         for _ in range(CANDIDATES):
-            is_lowest = values == jnp.min(values, axis=0, keepdims=True)
-            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * n), axis=0)
+            is_lowest = values == minimum_of(values, axis=0, keepdims=True)
+            chosen = minimum_of(jnp.where(is_lowest, number, CANDIDATES * n), axis=0)
             is_chosen = number == chosen[None]
             functions.append(first + chosen % n)
             taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
@@ -163,7 +163,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
         def minimum(number, tau):
             return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width, one)
 
-        return jnp.min(jax.vmap(jax.vmap(minimum))(number, where), axis=1)
+        return minimum_of(jax.vmap(jax.vmap(minimum))(number, where), axis=1)
 
     return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
 

@@ -22,7 +22,7 @@ from jax import Array
 from cspr_jax.families.swings.hypocycloid import Segment, oscillation, swing
 from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.numerics.bounds.value_and_derivatives import Bounds, hypotenuse
-from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.elementary import maximum_of, sincospi
 from cspr_jax.numerics.shapes import Float, Num
 
 
@@ -72,8 +72,8 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -
     force = (span * largest[2] + second_derivative * radius) / period + gain * (
         span * largest[1] / arcs + 2.0 * ratio * radius
     )
-    coupling = jnp.max(jnp.sum(jnp.abs(segment.coupling), axis=-1))
-    twist = jnp.max(jnp.abs(segment.twist))
+    coupling = maximum_of(jnp.sum(jnp.abs(segment.coupling), axis=-1))
+    twist = maximum_of(jnp.abs(segment.twist))
     return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (coupling + radius * twist)
 
 

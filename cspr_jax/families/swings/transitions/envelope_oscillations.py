@@ -21,7 +21,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.motion.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
-from cspr_jax.numerics.elementary import vertex
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, vertex
 from cspr_jax.numerics.search.minima import GOLDEN, Bracket, golden_step, inner_points
 from cspr_jax.numerics.shapes import Float
 
@@ -103,9 +103,9 @@ def _needed(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array
 
         indices, highest = _peaks(needed, values)
         low, high = tau[jnp.maximum(indices - 1, 0)], tau[jnp.minimum(indices + 1, len(tau) - 1)]
-        return _squared(jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high))), end)
+        return _squared(jnp.maximum(highest, maximum_of(jax.vmap(partial(_peak, at))(low, high))), end)
 
-    return jnp.max(jax.vmap(one)(weights))
+    return maximum_of(jax.vmap(one)(weights))
 
 
 def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
@@ -142,9 +142,9 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
         largest, at, width = state
         points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), low, high)
         values = jax.vmap(function)(points)
-        reciprocals = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_FRACTION * jnp.max(values), TINY))
+        reciprocals = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_FRACTION * maximum_of(values), TINY))
         move = vertex(reciprocals[0], reciprocals[1], reciprocals[2])[0]
-        return jnp.maximum(largest, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
+        return jnp.maximum(largest, maximum_of(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
 
     return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
 
@@ -159,12 +159,12 @@ def least_oscillations(
 @jax.jit
 def _extreme(weights: Array) -> Array:
     # The loads that a given N allows are an interval about zero: only the extreme cables matter.
-    return jnp.stack([jnp.max(weights), jnp.min(weights)])
+    return jnp.stack([maximum_of(weights), minimum_of(weights)])
 
 
 def horizontal_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
     """Real number of oscillations that the envelopes require on a horizontal transition: (1.53)."""
-    largest = jnp.max(jnp.abs(weights), keepdims=True)
+    largest = maximum_of(jnp.abs(weights), keepdims=True)
     return jnp.sqrt(jnp.maximum(_needed(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
 
 
@@ -200,4 +200,4 @@ def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
 
 def many_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
     """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55)."""
-    return jnp.max(jnp.abs(weights)) / math.pi * amplitude.largest[1]
+    return maximum_of(jnp.abs(weights)) / math.pi * amplitude.largest[1]

@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float, Num
 
 # Number of intervals of each piece of the amplitude function.
@@ -71,7 +72,7 @@ def proved_envelope(
     omega = (2.0 * math.pi * n) ** 2 - end
     # The squares are convex in the load: loads between these, such as 0 for the depth, have no lower envelopes.
     loads = jnp.stack(
-        [jnp.maximum(jnp.max(weights) + inclination, 0.0), jnp.minimum(jnp.min(weights) + inclination, 0.0)]
+        [jnp.maximum(maximum_of(weights) + inclination, 0.0), jnp.minimum(minimum_of(weights) + inclination, 0.0)]
     )
 
     def one(load):

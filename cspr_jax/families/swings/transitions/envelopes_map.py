@@ -15,6 +15,7 @@ from cspr_jax.families.swings.transitions.oscillations_map import MinimumOscilla
 from cspr_jax.families.swings.transitions.transition import inclination, weights
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.schema.tiles import Grid
 
 # An envelope may lie below zero by this much at the number of oscillations that keeps it positive.
@@ -33,8 +34,8 @@ def _at_times(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
         index = jnp.maximum(cable - 1, 0)
         numbers = (
             n,
-            jnp.where(cable > 0, squared[index], jnp.max(squared)),
-            jnp.where(cable > 0, envelope[index], jnp.min(envelope)),
+            jnp.where(cable > 0, squared[index], maximum_of(squared)),
+            jnp.where(cable > 0, envelope[index], minimum_of(envelope)),
         )
         return tuple(jnp.where(inside, value, jnp.nan) for value in numbers)
 

@@ -30,7 +30,7 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.elementary import maximum_of, minimum_of, sincospi
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.runtime.stages import stage
 
@@ -136,8 +136,8 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
         cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
         h = ((second_derivative - value * end) * cosine - 2.0 * omega * rate * sine) / period
         worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
-        lowest = jnp.min(1.0 + v[:, None] * value[None] * cosine[None] - worst, axis=1)
-        guard = ENVELOPE_ERROR * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
+        lowest = minimum_of(1.0 + v[:, None] * value[None] * cosine[None] - worst, axis=1)
+        guard = ENVELOPE_ERROR * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * maximum_of(jnp.abs(h)))
         return jnp.where(period > 0.0, lowest + guard, -jnp.inf)
 
     return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
@@ -249,7 +249,8 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
         second_derivative - value * segment.end_curvature
     ) / period * cosine - 2.0 * steady / period * rate * sine / (math.pi * arcs)
     level = 1.0 + v * value * cosine
-    return level - jnp.maximum(jnp.max(loads), 0.0) * coupling, level - jnp.minimum(jnp.min(loads), 0.0) * coupling
+    high, low = jnp.maximum(maximum_of(loads), 0.0), jnp.minimum(minimum_of(loads), 0.0)
+    return level - high * coupling, level - low * coupling
 
 
 def transition_margins(

@@ -12,12 +12,13 @@ import math
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 
 
 def least_oscillations(weights: Float[Array, "n_cables"], inclination: Float[Array, ""]) -> Float[Array, ""]:
     """Oscillations that the envelopes require with A = tau: n_gdl of (1.115), n_idl of (1.104) for v = 0."""
-    return jnp.max(jnp.abs(weights + inclination)) / (math.pi * jnp.sqrt((1.0 - inclination) * (1.0 + inclination)))
+    return maximum_of(jnp.abs(weights + inclination)) / (math.pi * jnp.sqrt((1.0 - inclination) * (1.0 + inclination)))
 
 
 def best_inclination(weights: Float[Array, "n_cables"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
@@ -26,7 +27,7 @@ def best_inclination(weights: Float[Array, "n_cables"]) -> tuple[Float[Array, ""
     Either it divides the load between the two extreme cables, v = -(w_hi + w_lo) / 2, or the cable with the
     largest weight has its own minimum before that, at v = -1 / w_C.
     """
-    high, low = jnp.max(weights), jnp.min(weights)
+    high, low = maximum_of(weights), minimum_of(weights)
     largest = jnp.where(high >= -low, high, low)
     magnitude = jnp.minimum(0.5 * jnp.abs(high + low), 1.0 / jnp.abs(largest))
     v = -jnp.sign(largest) * magnitude
