@@ -91,8 +91,8 @@ def _is_brief(motors, name, time, level):
 
     Friction then acts on the other side for that instant alone.
     """
-    beside = np.clip(time + RESOLVED * np.array([-1.0, 1.0]), *motors.motion.times)
-    return bool((motors.needs(name, beside[beside != time]) < level).all())
+    (start, end), beside = motors.motion.times, time + RESOLVED * np.array([-1.0, 1.0])
+    return bool((motors.needs(name, beside[(beside > start) & (beside < end)]) < level).all())
 
 
 def _check_cause(proof, motors, name, need, factor, start):
