@@ -16,7 +16,7 @@ from cspr_jax.motion.limits import lowest_depth, motor_limits_set
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import minimum_of
-from cspr_jax.numerics.search.minima import CLOSE, narrowed_times
+from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -31,9 +31,9 @@ SAMPLES = 64  # smallest number of samples of an arc
 BATCH = 512  # number of samples computed at a time
 # Largest number of samples that is held at a time.
 MAX_SAMPLES = 200_000
-# Points of Gauss's rule between two samples, and their weights.
-_GAUSS = np.polynomial.legendre.leggauss(2)
 TINY = 1e-300
+# A rate below this fraction of the next sample's is a standstill.
+STANDSTILL = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +99,8 @@ def _names(robot: Any) -> list[str]:
     return EXTREMES if robot.winches.stall_torque is not None else EXTREMES[:-1]
 
 
-def _extremes(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
+def _values_at(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
+    # Values whose extremes are searched, the cables that attain them, and torques of motors with rates of their cables.
     state = motion.state(tau)
     if robot.n_cables > robot.dof:
         chosen = cables.shared(robot, state, limits, rule)
@@ -131,26 +132,20 @@ def _extremes(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Ar
     }
     nearest = dict.fromkeys(EXTREMES, jnp.asarray(-1.0))
     nearest |= {name: jnp.argmin(values).astype(float) for name, values in of_cables.items()}
-    return jnp.stack([table[name] for table in (extremes, nearest) for name in _names(robot)])
+    values = [table[name] for table in (extremes, nearest) for name in _names(robot)]
+    return jnp.hstack(values if robot.winches is None else [*values, of_motors.motor_torque, rate])
 
 
-def _torques(robot, limits: Limits, _, rule: str, motion: Motion, tau: Array) -> Array:
-    state = motion.state(tau)
-    tensions = cables.tensions(robot, state, limits, rule)
-    return motor_demands(robot.winches, cables.cable_motion(robot, state), tensions).motor_torque
+@persistent_jit(static_argnames=("rule",))
+def _values(case, arguments, *, rule: str) -> Array:
+    robot, limits, corners = case
+    return jax.vmap(partial(_values_at, robot, limits, corners, rule))(*arguments)
 
 
-_AT_TIME: dict[str, Callable[..., Array]] = {"extremes": _extremes, "torques": _torques}
-
-
-@persistent_jit(static_argnames=("rule", "quantity"))
-def _values(case, arguments, *, rule: str, quantity: str) -> Array:
-    return jax.vmap(partial(_AT_TIME[quantity], *case, rule))(*arguments)
-
-
-@persistent_jit(static_argnames=("rule", "quantity"))
-def _values_of_one(case, motion: Motion, tau: Array, *, rule: str, quantity: str) -> Array:
-    return jax.vmap(partial(_AT_TIME[quantity], *case, rule, motion))(tau)
+@persistent_jit(static_argnames=("rule",))
+def _values_of_one(case, motion: Motion, tau: Array, *, rule: str) -> Array:
+    robot, limits, corners = case
+    return jax.vmap(partial(_values_at, robot, limits, corners, rule, motion))(tau)
 
 
 def peaks(
@@ -165,7 +160,8 @@ def peaks(
     # Give every limit of tensions a value, so that one compiled function serves all.
     low, high = tension_range(robot, limits)
     limits = dataclasses.replace(_of_motors(robot, limits), tension_min=low, tension_max=high)
-    table, torques = np.empty((len(motions), 3, len(_names(robot)))), np.full(len(motions), np.nan)
+    count = len(_names(robot))
+    table, torques = np.empty((len(motions), 3, count)), np.full(len(motions), np.nan)
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
@@ -174,17 +170,18 @@ def peaks(
         group = i if has_pieces(motion) else None
         shapes = tuple(np.shape(array) for array in jax.tree.leaves(motion))
         alike.setdefault((group, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
-    for (*_, count), members in alike.items():
-        length = max(MAX_SAMPLES // count, 1)
+    for (*_, n_samples), members in alike.items():
+        length = max(MAX_SAMPLES // n_samples, 1)
         for first in range(0, len(members), length):
             stage(f"demands of {len(motions)} segments")
             batch = members[first : first + length]
             alike_motions, tau = [motions[i] for i in batch], np.stack([times[i] for i in batch])
-            along = partial(_along, (robot, limits, corners), alike_motions, rule=rule)
-            table[batch] = _narrowed(along(quantity="extremes"), tau, len(_names(robot)))
+            along = _along((robot, limits, corners), alike_motions, rule)
+            values = along(tau)
+            table[batch] = _narrowed(along, tau, values, count)
             if robot.winches is not None:
-                torques[batch] = _root_mean_squares(along(quantity="torques"), tau)
-    missing = np.full((len(motions), 3, len(EXTREMES) - table.shape[2]), np.nan)
+                torques[batch] = _root_mean_squares(tau, *np.split(values[..., 2 * count :], 2, axis=2))
+    missing = np.full((len(motions), 3, len(EXTREMES) - count), np.nan)
     missing[:, 2] = -1.0
     table = np.concatenate([table, missing], axis=2)
     columns = (table[:, 0] * _SIGNS + 0.0).T  # no -0
@@ -205,7 +202,7 @@ def _of_motors(robot: Any, limits: Limits) -> Limits:
     return Limits(**{row.name: getattr(limits, row.name) for row in rows})
 
 
-def _along(case: tuple[Any, Limits, Any], motions: list[Motion], **how: str) -> Callable[[np.ndarray], np.ndarray]:
+def _along(case: tuple[Any, Limits, Any], motions: list[Motion], rule: str) -> Callable[[np.ndarray], np.ndarray]:
     # Values at times (n_motions, n) along motions of one structure, (n_motions, n, ...). Searches for several extremes
     # meet at the same times, each of which is computed once.
     shape = common_shape(motions[0])
@@ -217,29 +214,33 @@ def _along(case: tuple[Any, Limits, Any], motions: list[Motion], **how: str) -> 
     def values(tau: np.ndarray) -> np.ndarray:
         if stacked is None:
             times, rows = np.unique(tau, return_inverse=True)
-            computed = in_batches(partial(_values_of_one, case, shape, **how), times, batch_size=BATCH)
+            computed = in_batches(partial(_values_of_one, case, shape, rule=rule), times, batch_size=BATCH)
         else:
             times, rows = np.unique(np.arange(len(tau))[:, None] + 1j * tau, return_inverse=True)
             items = jax.tree.map(lambda array: array[times.real.astype(int)], stacked)
-            computed = in_batches(partial(_values, case, **how), (items, times.imag), batch_size=BATCH)
+            computed = in_batches(partial(_values, case, rule=rule), (items, times.imag), batch_size=BATCH)
         return computed[rows.reshape(tau.shape)]
 
     return values
 
 
-def _root_mean_squares(torques: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
-    # Integrate squares between every other sample, and joints of pieces, by Gauss's rule, whose points avoid jumps of
-    # friction at samples; take the largest mean of a motor, (n_motions,).
-    is_joint = (np.diff(tau) <= CLOSE).any(0)
-    edges = tau[:, (np.arange(tau.shape[1]) % 2 == 0) | np.append(is_joint, True) | np.append(True, is_joint)]
-    width, middle = 0.5 * np.diff(edges), 0.5 * (edges[:, 1:] + edges[:, :-1])
-    points = (middle[..., None] + width[..., None] * _GAUSS[0]).reshape(len(tau), -1)
-    weights = (width[..., None] * _GAUSS[1]).reshape(len(tau), -1, 1)
-    means = np.sum(weights * torques(points) ** 2, axis=1) / np.maximum(tau[:, -1] - tau[:, 0], TINY)[:, None]
-    return np.sqrt(means.max(1))
+def _root_mean_squares(
+    tau: Float[np.ndarray, "n_motions n"],
+    torques: Float[np.ndarray, "n_motions n n_cables"],
+    rates: Float[np.ndarray, "n_motions n n_cables"],
+) -> Float[np.ndarray, " n_motions"]:
+    # Largest mean of a motor. Friction jumps where a rate changes its sign or vanishes: up to there counts the value at
+    # the sample on that side.
+    width, squares, speeds = np.diff(tau)[..., None], torques**2, np.abs(rates)
+    earlier, later = speeds[:, :-1], speeds[:, 1:]
+    both = earlier + later
+    jumps = (rates[:, :-1] * rates[:, 1:] <= STANDSTILL * both**2) & (both > 0.0)
+    fraction = np.where(jumps, earlier / np.where(jumps, both, 1.0), 0.5)
+    integrals = np.sum(width * (fraction * squares[:, :-1] + (1.0 - fraction) * squares[:, 1:]), axis=1)
+    return np.sqrt((integrals / np.maximum(np.sum(width, axis=1), TINY)).max(1))
 
 
-def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, count: int) -> np.ndarray:
-    minimum, when = narrowed_times(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
-    nearest = np.diagonal(at(when)[..., count:], axis1=1, axis2=2)
+def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, samples: np.ndarray, count: int) -> np.ndarray:
+    minimum, when = narrowed_times(lambda points: at(points)[..., :count], tau, samples[..., :count])
+    nearest = np.diagonal(at(when)[..., count : 2 * count], axis1=1, axis2=2)
     return np.stack([minimum, when, nearest], axis=1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_values
+from cspr_jax.numerics.search.minima import followed, lowest_samples, narrowed_times, vertex_values
 
 DEPTHS = np.array([0.3, 0.2, 0.25, 0.1, 0.28, 0.27, 0.26, 0.15])
 KINKS = (np.arange(len(DEPTHS)) + 0.37) / len(DEPTHS)
@@ -45,6 +45,34 @@ def test_parabolas_do_not_reach_across_what_does_not_count():
     tau = np.array([0.0, 0.01, 0.5, 1.0])
     values = np.array([1.0, 0.9, np.inf, 0.95])[:, None]
     np.testing.assert_array_equal(vertex_values(tau, values), values)
+
+
+def test_starts_that_cannot_become_the_best_are_given_up():
+    """Of waves and kinks of two heights; starts of nearly equal values are followed to their ends."""
+    rng = np.random.default_rng(8)
+    tau = np.linspace(0.0, 1.0, 41)
+    dense = np.linspace(0.0, 1.0, 400_001)
+    counts, last_counts = [], []
+    for _ in range(60):
+        phase, height, frequency, kinks = (
+            rng.uniform(0.0, 6.0),
+            rng.uniform(0.0, 0.3),
+            rng.uniform(9, 40),
+            rng.random(9),
+        )
+
+        def waves(times, phase=phase, height=height, frequency=frequency, kinks=kinks):
+            counts.append(len(np.unique(times)))
+            wave = np.cos(frequency * times + phase) + height * times
+            return np.stack([wave, np.abs(times[..., None] - kinks).min(-1) * (1.0 + wave) + wave], axis=-1)
+
+        values = waves(tau[None])
+        truth = waves(dense[None])[0].min(0)
+        counts.clear()
+        smallest, _ = narrowed_times(waves, tau, values)
+        assert (smallest[0] <= truth + 1e-5).all()
+        last_counts.append(counts[-1])
+    assert np.mean(last_counts) < 17 * 3
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])

@@ -18,6 +18,8 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 STARTS = 3
 POINTS = 17
 ROUNDS = 4
+# Between points a function falls below the lower one by less than this multiple of the difference to its neighbours.
+DROP = 2.0
 # A second derivative can be estimated from three samples if the ratio of their distances is at least this.
 EVEN = 1e-6
 CLOSE = 1e-12  # distance of the two samples on both sides of a joint of pieces
@@ -124,13 +126,26 @@ def followed(
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
         # Around each start keep only the values of its own function: (n_motions, n_starts, n_functions, n).
         of_start = np.moveaxis(samples[:, :, column, :, column], 0, 2)
-        lowest = of_start.min(3)
-        centers = np.take_along_axis(points, of_start.argmin(3)[..., None], axis=3)[..., 0]
+        lowest, at_lowest = of_start.min(3), of_start.argmin(3)[..., None]
+        centers = np.take_along_axis(points, at_lowest, axis=3)[..., 0]
+        drop = DROP * np.take_along_axis(_rises(of_start), at_lowest, axis=3)[..., 0]
         # Treat NaN as the smallest value, as NumPy's minimum does.
         best = np.argsort(np.where(np.isnan(lowest), -np.inf, lowest), axis=1, kind="stable")[:, :n_followed]
-        lowest, centers, width = (np.take_along_axis(table, best, axis=1) for table in (lowest, centers, width))
+        lowest, centers, width, drop = (
+            np.take_along_axis(table, best, axis=1) for table in (lowest, centers, width, drop)
+        )
+        # Give up a start that can no longer become the best: its points become those of the best.
+        is_lost = lowest - drop > lowest[:, :1]
+        centers, width = (np.where(is_lost, table[:, :1], table) for table in (centers, width))
         width = 2.0 * width / (POINTS - 1)
     return lowest[:, 0], centers[:, 0]
+
+
+def _rises(values: np.ndarray) -> np.ndarray:
+    # Larger one of the differences between each value (..., n) and its neighbors.
+    with np.errstate(invalid="ignore"):  # values may be infinite
+        rises = np.abs(np.diff(values, axis=-1, prepend=values[..., :1], append=values[..., -1:]))
+    return np.maximum(rises[..., :-1], rises[..., 1:])
 
 
 def _distances(tau: np.ndarray) -> np.ndarray:

@@ -216,7 +216,10 @@ def torques(
     """Torques that wind, N m, from winding speeds and accelerations; `side` is s of the equation above, or 0."""
     load = radius * tensions / winches.gear_ratio
     moved = winches.motor_inertia * acceleration + side * winches.friction + winches.viscous_friction * speed
-    return load * winches.efficiency ** -jnp.asarray(side) + moved
+    side = jnp.asarray(side)
+    # A choice costs less than a power.
+    losses = jnp.where(side > 0.0, 1.0 / winches.efficiency, jnp.where(side < 0.0, winches.efficiency, 1.0))
+    return load * losses + moved
 
 
 def motor_states(
