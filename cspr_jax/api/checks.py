@@ -333,7 +333,7 @@ def _function(function: Any, duration: float | None, spec: PlanFile) -> Placed[F
         raise InputError("positions", None, "must be given beside times: (n, 3) m", problem="missing")
     if duration is None:
         raise InputError("duration", None, "must be given beside a function: s", problem="missing")
-    file = without_cables(resolve_robot(spec.robot, NAME, Path()), spec.without, NAME)
+    file = without_cables(resolve_robot(spec.robot, NAME, Path(), spec.parameters), spec.without, NAME)
     frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, spec, NAME))
     motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)
     return Placed(motion, frame)

@@ -102,7 +102,9 @@ def check_many(  # noqa: PLR0913
     _check_shapes(count, rows, {name: np.shape(array) for name, array in others.items() if array is not None})
     sample_times = np.broadcast_to(np.asarray(times, float), (count, rows))
     with double_precision():
-        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["spline"].legs], spec.without, NAME)
+        file = as_moved(
+            resolve_robot(spec.robot, NAME, Path(), spec.parameters), [FAMILIES["spline"].legs], spec.without, NAME
+        )
         problem = build_problem(file, spec, spec, NAME, any_cables=True)
         axes = frame_of(file.base_points, file.z_axis)
         reference = reference_of(build_robot(file, spec, NAME))

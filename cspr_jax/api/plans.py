@@ -11,10 +11,11 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed, plan_summary
+from cspr_jax.config.keys.parameter import with_values
 from cspr_jax.config.plan import checked_plan
-from cspr_jax.config.reading import json_text, plain_values
+from cspr_jax.config.reading import json_text, plain_values, read_toml
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import File
+from cspr_jax.errors.arguments import File, Parameters
 from cspr_jax.launch.landings import LaunchErrors, Scatter
 from cspr_jax.launch.launch_result import LaunchResult
 from cspr_jax.numerics.elementary import double_precision
@@ -298,12 +299,13 @@ class Plan(Displayed, planning.PlannedMotions):
 
 
 @checked()
-def plan(given: File) -> Plan:
+def plan(given: File, parameters: Parameters = None) -> Plan:
     """Plan a sequence of poses.
 
     Args:
         given: path of a plan file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
             lists). Paths in a dictionary are relative to the current folder.
+        parameters: values of parameters of the robot file, by name; they replace those of the plan.
 
     Returns:
         the plan, feasible or not.
@@ -312,12 +314,14 @@ def plan(given: File) -> Plan:
         ConfigError: the plan has mistakes; `lines` of the error names all that were found.
     """
     with double_precision():
-        if isinstance(given, Mapping):
-            data = plain_values(given)
-            planned = planning.plan_of(checked_plan(data, NAME), NAME)
+        path = NAME if isinstance(given, Mapping) else Path(given)
+        if isinstance(given, Mapping) or parameters:
+            data = plain_values(given) if isinstance(given, Mapping) else read_toml(path)
+            data = with_values(data, parameters)
+            planned = planning.plan_of(checked_plan(data, path), path)
             text = json_text(data)
         else:
-            planned = planning.plan(Path(given))
+            planned = planning.plan(path)
             text = planned.text
     fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
     return Plan(**fields | {"text": text})

@@ -227,7 +227,9 @@ def _workspace(result: Result, name: str) -> _StaticPoses:
         allowed = "must be absent or list cables: motors are sized for one robot"
         raise ConfigError(name, f'without = "{ANY_ONE}": {allowed}')
     patterns = [MAP_KINDS["workspace"].patterns]
-    robot_file = as_moved(resolve_robot(spec.robot, Path(name), Path()), patterns, spec.without, Path(name))
+    robot_file = as_moved(
+        resolve_robot(spec.robot, Path(name), Path(), spec.parameters), patterns, spec.without, Path(name)
+    )
     _check_winches(robot_file, name)
     inside = np.nonzero(np.asarray(result.data["verdict"]) == 0)
     if not len(inside[0]):

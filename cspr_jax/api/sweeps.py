@@ -16,9 +16,10 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import ResultOrPath, checked
 from cspr_jax.api.notebooks import Displayed
+from cspr_jax.config.keys.parameter import with_values
 from cspr_jax.config.reading import json_text, plain_values
 from cspr_jax.errors import ConfigError
-from cspr_jax.errors.arguments import AnyInteger, File, PathNames, TileRange
+from cspr_jax.errors.arguments import AnyInteger, File, Parameters, PathNames, TileRange
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.runtime.processes import check_count
 from cspr_jax.runtime.xla import keep_compiled_code as _keep_compiled_code
@@ -164,11 +165,11 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
     yield executors.ThisProcess(tile_map) if count == 1 else executors.Processes(job.sweep, count)
 
 
-def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
+def checked_sweep(source: str | Path | Mapping[str, Any], parameters: Mapping[str, float] | None = None) -> Sweep:
     """The sweep of a file or dictionary, checked; nothing is computed."""
     if not isinstance(source, Mapping):
-        return read_sweep(Path(source))
-    data = plain_values(source)
+        return read_sweep(Path(source), parameters)
+    data = with_values(plain_values(source), parameters)
     return sweep_of(data, NAME, text=json_text(data))
 
 
@@ -177,6 +178,7 @@ def run(
     given: File,
     directory: str | Path | None = None,
     *,
+    parameters: Parameters = None,
     workers: AnyInteger | None = 1,
     scheduler: str | None = None,
     prune: bool = False,
@@ -190,6 +192,7 @@ def run(
         given: path of a sweep file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
             lists). Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
         directory: run directory; None: results/<sweep>-<first 12 digits of its identity>.
+        parameters: values of parameters of the robot file, by name; they replace those of the sweep.
         workers: number of processes on this machine; None: the usual number for its kind of map. Above 1, a script must
             call this function under `if __name__ == "__main__":`.
         scheduler: address of a dask.distributed scheduler whose workers compute instead.
@@ -209,7 +212,7 @@ def run(
         ResourceError: memory or workers do not suffice.
         SelfCheckError: the computed numbers contradict each other.
     """
-    sweep = checked_sweep(given)
+    sweep = checked_sweep(given, parameters)
     hooks = engine.Hooks(warn=lambda line: warnings.warn(line, stacklevel=2))
     if on_tile is not None:
         hooks.on_tile = on_tile

@@ -9,6 +9,7 @@ from cspr_jax.config.keys.limits import LimitKeys
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import Parameters
 from cspr_jax.motion.given_limits import check_bounded, limits_of, pair_limits
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.model.limits import Limits
@@ -87,24 +88,25 @@ def _of_cables(robot_file: RobotFile) -> dict[str, Any]:
 
 
 @overload
-def load_robot(reference: PointMassName) -> PointMassRobot: ...
+def load_robot(reference: PointMassName, parameters: Parameters = None) -> PointMassRobot: ...
 @overload
-def load_robot(reference: PlatformName) -> PlatformRobot: ...
+def load_robot(reference: PlatformName, parameters: Parameters = None) -> PlatformRobot: ...
 @overload
-def load_robot(reference: str | Path) -> Any: ...
-def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
+def load_robot(reference: str | Path, parameters: Parameters = None) -> Any: ...
+def load_robot(reference: str | Path, parameters: Parameters = None) -> PointMassRobot | PlatformRobot:
     """Load a robot of the catalogue, or of a file, with its axes and its limits.
 
     Args:
         reference: a catalogue name, or the path of a robot file.
+        parameters: values of parameters of the file, [[parameter]], by name.
 
     Returns:
         the robot: a point mass or a platform.
 
     Raises:
-        ConfigError: there is no such robot, or its file has a mistake.
+        ConfigError: there is no such robot, its file has a mistake, or it has no such parameter or value.
     """
-    robot_file = resolve_robot(str(reference), reference, Path.cwd())
+    robot_file = resolve_robot(str(reference), reference, Path.cwd(), parameters)
     return build_robot(robot_file, TrajectoryKeys(), reference)
 
 

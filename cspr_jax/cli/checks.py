@@ -9,6 +9,8 @@ from cspr_jax.cli.command import (
     add_all_errors,
     add_device,
     add_json,
+    add_parameters,
+    parameters_of,
     prepare_jax,
     print_json,
     print_line,
@@ -64,6 +66,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         help="find the least uniform stretching of time that is feasible, and check what it stretches",
     )
     add_without(parser)
+    add_parameters(parser)
     add_retime(parser, "run along its path in the least time that all limits allow, and check what comes of it")
     add_json(parser)
     add_files(parser, "400 rows", "write the motion even if it is not feasible")
@@ -74,6 +77,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 def _spec(options: argparse.Namespace) -> dict[str, Any]:
     from cspr_jax.config.keys.limits import LimitTable
     from cspr_jax.config.keys.obstacles import ObstacleKeys
+    from cspr_jax.config.keys.parameter import with_values
     from cspr_jax.config.reading import checked, read_toml
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
@@ -82,6 +86,7 @@ def _spec(options: argparse.Namespace) -> dict[str, Any]:
         name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point", "without")
     }
     spec = {name: value for name, value in spec.items() if value is not None} | {"robot": options.robot}
+    spec = with_values(spec, parameters_of(options))
     if options.limits is not None:
         limits = read_toml(options.limits)
         around = {name: limits.pop(name) for name in ObstacleKeys.model_fields if name in limits}

@@ -45,6 +45,32 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all-errors", action="store_true", help="print all mistakes in a file, one per line")
 
 
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """Add the option that sets parameters of the robot."""
+    parser.add_argument(
+        "--set",
+        dest="parameters",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="value of a parameter of the robot file, [[parameter]]; may be given several times",
+    )
+
+
+def parameters_of(options: argparse.Namespace) -> dict[str, float]:
+    """Values of parameters, from the options."""
+    values = {}
+    for text in options.parameters:
+        name, _, number = text.partition("=")
+        try:
+            values[name] = float(number)
+        except ValueError:
+            values[name] = math.nan
+        if not name or not math.isfinite(values[name]):
+            raise ConfigError("--set", f"{text}: must be NAME=VALUE, a parameter of the robot and a number")
+    return values
+
+
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
     """Add the option that names the file or folder to write."""
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)

@@ -11,7 +11,9 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    add_parameters,
     checked_picture,
+    parameters_of,
     prepare_jax,
     print_answer,
     print_json,
@@ -32,6 +34,7 @@ _STEP = "longest step of MuJoCo, s (default 0.0005)"
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
+    add_parameters(parser)
     add_json(parser)
     add_retime(parser, "run along the paths of the plan in the least time that all limits allow")
     add_files(parser, "`samples` rows per segment", "write the best candidate's motion even if it is not feasible")
@@ -168,11 +171,12 @@ def _check_step(options: argparse.Namespace) -> None:
 def _planned(options: argparse.Namespace) -> Any:
     from cspr_jax.config.hints import plan_hints, robot_hints
 
+    parameters = parameters_of(options)
     with waiting():
         prepare_jax(options, quick=True)
         from cspr_jax.api import plans
 
-        plan = plans.plan(options.plan)
+        plan = plans.plan(options.plan, parameters)
     hints = robot_hints(plan.robot_file) + ([] if plan.feasible else plan_hints(plan.keys, plan.robot_file))
     for line in [*plan.warnings, *(f"hint: {line}" for line in hints)]:
         warn(line)
@@ -267,6 +271,7 @@ def print_last_step(plan: Any, options: argparse.Namespace) -> None:
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
+    add_parameters(parser)
     add_json(parser)
     add_output(parser, "draw both paths and the deviations: .png, .pdf, .svg", metavar="FILE")
     parser.add_argument(

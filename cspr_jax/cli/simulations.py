@@ -9,7 +9,9 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    add_parameters,
     checked_picture,
+    parameters_of,
     prepare_jax,
     print_answer,
     warn,
@@ -33,6 +35,7 @@ NUMBERS = {
 
 def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML), whose robot has axial_stiffness and [winch]")
+    add_parameters(parser)
     add_json(parser)
     add_output(parser, "draw both paths, errors, tensions and torques: .png, .pdf, .svg", metavar="FILE")
     for name, (metavar, text) in NUMBERS.items():
@@ -56,7 +59,7 @@ def _simulate(options: argparse.Namespace) -> int:
         from cspr_jax.api.files.simulations import simulate
         from cspr_jax.api.plans import plan
 
-        planned = plan(options.plan)
+        planned = plan(options.plan, parameters_of(options))
         if not (planned.feasible or options.anyway):
             warn(f"{options.plan}: not driven, since a segment is not proved feasible (--anyway drives it)")
             return ExitCode.NOT_FEASIBLE

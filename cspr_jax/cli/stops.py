@@ -9,7 +9,9 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    add_parameters,
     checked_picture,
+    parameters_of,
     prepare_jax,
     print_json,
     print_table,
@@ -30,6 +32,7 @@ def _add_stops(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--without", type=int, nargs="+", metavar="CABLE", help="cables that break at the instant, from 0 on"
     )
+    add_parameters(parser)
     add_json(parser)
     add_output(parser, "draw plan and stops: .png, .pdf, .svg", metavar="FILE")
     add_style(parser)
@@ -46,7 +49,7 @@ def _print_stops(options: argparse.Namespace) -> int:
         from cspr_jax.api import plans
         from cspr_jax.api.stops import stops
 
-        plan = plans.plan(options.plan)
+        plan = plans.plan(options.plan, parameters_of(options))
         for line in plan.warnings:
             warn(line)
         if not plan.feasible:

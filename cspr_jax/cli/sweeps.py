@@ -12,6 +12,8 @@ from cspr_jax.cli.command import (
     add_device,
     add_json,
     add_output,
+    add_parameters,
+    parameters_of,
     prepare_jax,
     print_json,
     print_line,
@@ -28,6 +30,7 @@ VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "proved", 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sweep", type=Path, help="sweep file (TOML)")
+    add_parameters(parser)
     add_output(parser, "run directory (default results/...)", metavar="DIR")
     parser.add_argument(
         "--workers",
@@ -70,7 +73,7 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
-    sweep = sweeps.checked_sweep(options.sweep)
+    sweep = sweeps.checked_sweep(options.sweep, parameters_of(options))
     if options.scheduler is not None:
         process_environment.quiet_scheduler()
     directory = options.output or sweeps.run_directory(sweep)

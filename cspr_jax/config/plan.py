@@ -11,6 +11,7 @@ from cspr_jax.config.keys.free_motions import FreeMotionKeys
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.config.keys.limits import LimitTable, Point, Positive
 from cspr_jax.config.keys.obstacles import ObstacleKeys
+from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, ParameterValues
 from cspr_jax.config.keys.path import PathTable
 from cspr_jax.config.keys.pose import Pose, Turns
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
@@ -40,6 +41,7 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    parameters: ParameterValues | None = Field(None, description=VALUES_DESCRIPTION)
     without: MissingCables | None = Field(None, description=DESCRIPTION)
     z0: Depth | None = Field(
         None,

@@ -21,6 +21,13 @@ from cspr_jax.config.keys.limits import (
     Point,
     Positive,
 )
+from cspr_jax.config.keys.parameter import (
+    MAX_PARAMETERS,
+    ParameterTable,
+    changed,
+    check_parameters,
+    moved,
+)
 from cspr_jax.config.keys.winch import WinchTable
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
 from cspr_jax.config.wording import table_error
@@ -29,6 +36,7 @@ from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.model.parallel_pairs import COUNT, ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.quantities import PARAMETER
 
 SMALLEST_COUNTS = "least numbers of cables are " + ", ".join(
     f"{row.dof} ({row.description})" for row in PATTERNS.values()
@@ -102,6 +110,9 @@ class RobotFile(LimitKeys):
         "simulations for MuJoCo have it (default 0)",
     )
     winch: WinchTable | None = Field(None, description="winches of the cables")
+    parameter: Annotated[list[ParameterTable], Field(min_length=1, max_length=MAX_PARAMETERS)] | None = Field(
+        None, description="[[parameter]]: named numbers that move others, for designs, maps over robots, and --set"
+    )
     _notes: tuple[str, ...] = PrivateAttr(())  # about items of a file of another program
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
 
@@ -283,6 +294,46 @@ class RobotFile(LimitKeys):
                 raise table_error("cable_diameter", self.cable_diameter, "a number > 0 beside winch.layer_turns, m")
         return self
 
+    @model_validator(mode="after")
+    def _have_robots(self) -> "RobotFile":
+        if not self.parameter:
+            return self
+        spec = self.model_dump(exclude_none=True, exclude={"parameter"})
+        check_parameters(self.parameter, spec)
+        for i, parameter in enumerate(self.parameter):
+            for bound in ("lower", "upper"):
+                value = getattr(parameter, bound)
+                try:
+                    alone = changed(self.parameter, {parameter.name: value})
+                    checked(RobotFile, moved(spec, alone), "robot")
+                except (ConfigError, InputError) as error:
+                    reason = str(error).removeprefix("robot: ")
+                    raise table_error(
+                        f"parameter[{i}].{bound}", value, f"a value that gives a robot ({reason})"
+                    ) from error
+        return self
+
+    def with_parameters(self, values: Mapping[str, float]) -> "RobotFile":
+        """The robot at other values of its parameters; its numbers have moved, and these values are those of its file.
+
+        Raises:
+            InputError: no parameter has this name, a value is beyond its bounds, or there is no such robot.
+        """
+        if not values:
+            return self
+        parameters = self.parameter or []
+        changes = changed(parameters, values)
+        try:
+            spec = moved(self.model_dump(exclude_none=True, exclude={"parameter"}), changes)
+            robot_file = checked(RobotFile, spec, "robot")
+        except ConfigError as error:
+            problem = str(error).removeprefix("robot: ")
+            raise InputError("parameters", dict(values), "values that give a robot", problem=problem) from error
+        tables = [table.at(table.value + changes.get(PARAMETER + table.name, 0.0)) for table in parameters]
+        robot_file = robot_file.model_copy(update={"parameter": tables})
+        robot_file._file, robot_file._notes = self._file, self._notes
+        return robot_file
+
     def placed(self, key: str, file: object) -> tuple[object, str]:
         """File and dotted name by which errors refer to a key of the robot."""
         return (file, f"robot.{key}") if self._file is None else (self._file, key)
@@ -302,8 +353,18 @@ def _check_level(points: list[Point]) -> None:
         raise table_error("base_points", heights, "level in a planar robot: give both spools the same z")
 
 
-def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
-    """The robot that a plan or sweep names."""
+def resolve_robot(
+    reference: Any, file: object, directory: Path, parameters: Mapping[str, float] | None = None
+) -> RobotFile:
+    """The robot that a plan or sweep names, at the values that it gives to the robot's parameters."""
+    robot_file = _named_robot(reference, file, directory)
+    try:
+        return robot_file.with_parameters(parameters or {})
+    except InputError as error:
+        raise ConfigError(file, str(error)) from error
+
+
+def _named_robot(reference: Any, file: object, directory: Path) -> RobotFile:
     if isinstance(reference, dict):
         return checked(RobotFile, reference, file, at="robot")
     if not isinstance(reference, str):

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from cspr_jax.config.keys.ellipse import SweepEllipse
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import Coordinate, LimitTable, Point
 from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
+from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, ParameterValues
 from cspr_jax.config.keys.path import TargetPath
 from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
@@ -19,7 +29,7 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, name_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import PARAMETER, QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
@@ -97,6 +107,45 @@ class Axes(Table):
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
     from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
+    parameter: dict[str, Axis] | None = Field(
+        None,
+        description='"parameter.NAME": values of a parameter of the robot file, so that cells are of different robots',
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_parameters(cls, data: Any) -> Any:
+        # TOML takes a name in quotes, "parameter.width", as one key, and one without quotes as a table.
+        if not isinstance(data, dict):
+            return data
+        named = {name: axis for name, axis in data.items() if name.startswith(PARAMETER)}
+        if not named:
+            return data
+        given = data.get("parameter")
+        axes = {name.removeprefix(PARAMETER): axis for name, axis in named.items()}
+        others = {name: axis for name, axis in data.items() if name not in named}
+        return others | {"parameter": {**(given if isinstance(given, dict) else {}), **axes}}
+
+    @model_serializer(mode="wrap")
+    def _named(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        axes = dump(self)
+        parameters = axes.pop("parameter", None) or {}
+        return axes | {PARAMETER + name: axis for name, axis in parameters.items()}
+
+    def named(self, name: str) -> Any:
+        """An axis by its name, or None."""
+        if name.startswith(PARAMETER):
+            return (self.parameter or {}).get(name.removeprefix(PARAMETER))
+        return getattr(self, name)
+
+
+def axis_names(axes: Mapping[str, Any]) -> list[str]:
+    """Names of the axes of a parsed file, in its order."""
+    parts = [
+        [PARAMETER + inner for inner in axis] if name == "parameter" and isinstance(axis, Mapping) else [name]
+        for name, axis in axes.items()
+    ]
+    return [name for names in parts for name in names]
 
 
 BetaHatChoice = Annotated[
@@ -203,6 +252,7 @@ class _SweepKeys(Table):
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    parameters: ParameterValues | None = Field(None, description=VALUES_DESCRIPTION)
     without: WithoutInSweeps | None = Field(
         None,
         description=f'{DESCRIPTION}; workspaces: "{ANY_ONE}", each single cable gone in turn, all must be feasible',

@@ -48,7 +48,7 @@ def long_plan(plan_file: PlanFile, path: Path) -> PlannedMotions:
     for key in ("smooth", "stretch"):
         if getattr(plan_file, key) is not None:
             raise ConfigError(path, f"{key}: must be absent in a table of so many rows")
-    robot_file = resolve_robot(plan_file.robot, path, Path())
+    robot_file = resolve_robot(plan_file.robot, path, Path(), plan_file.parameters)
     robot_file = as_moved(robot_file, [FAMILIES["spline"].legs], plan_file.without, path)
     problem = build_problem(robot_file, plan_file, plan_file, path, any_cables=True)
     if problem.limits.uncertainty is not None:

@@ -17,13 +17,13 @@ from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema.families import ANY_PATTERN
 from cspr_jax.schema.plugins import ExtensibleRows
 from cspr_jax.schema.quantities import (
-    EVERY,
     MOTION_CLEARANCE,
     OF_ELLIPSES,
     OF_PATHS,
     POSE_VERDICT,
     QUANTITIES,
     Quantity,
+    row_of,
 )
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
@@ -412,7 +412,7 @@ MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
 def quantity_of(kind: object, name: str) -> Quantity:
     """The row of a quantity, with the description of a kind of map if it has one."""
     forms = MAP_KINDS[kind].forms if isinstance(kind, str) and kind in MAP_KINDS else ()
-    return next((row for form in forms for row in form.rows if row.name == name), EVERY[name])
+    return next((row for form in forms for row in form.rows if row.name == name), None) or row_of(name)
 
 
 def register(kind: MapKind, *quantities: Quantity) -> None:

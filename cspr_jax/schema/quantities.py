@@ -2,7 +2,8 @@
 
 import dataclasses
 from collections import ChainMap
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 
@@ -108,6 +109,8 @@ AXES = {
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 # Axes without a best point: a motion passes all times, and a robot has all cables.
 _NO_CHOICES = ("tau", "cable")
+# Beginning of the names of axes that are parameters of the robot.
+PARAMETER = "parameter."
 
 
 def best_name(axis: str) -> str:
@@ -998,6 +1001,31 @@ QUANTITIES = {
 RATIO = Quantity("ratio", "1", "ratio", "A quantity of one map over that of another, as `cspr plot --ratio` shows it.")
 EVERY = ChainMap(AXES, QUANTITIES, BEST, {RATIO.name: RATIO}, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
 _OWN = frozenset(QUANTITIES)
+
+
+def is_axis(name: object) -> bool:
+    """Tell whether a name is that of an axis of maps."""
+    return isinstance(name, str) and (name in AXES or (name.startswith(PARAMETER) and name != PARAMETER))
+
+
+def row_of(name: str) -> Quantity:
+    """The row of a quantity or an axis, also of a parameter of the robot, or of its best value."""
+    if name in EVERY:
+        return EVERY[name]
+    best, _, parameter = name.rpartition(PARAMETER)
+    if best == best_name(""):
+        words = f"With `--best {PARAMETER}{parameter}`: the best value; NaN where no value is feasible."
+        return Quantity(name, "1", f"best {parameter}", words)
+    if best:
+        raise KeyError(name)
+    return Quantity(name, "1", parameter, f"Value of the parameter {parameter} of the robot file.")
+
+
+def parameter_units(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Units of the axes that are parameters, and of their best values, from the settings of a sweep."""
+    units = {table["name"]: table["unit"] for table in settings.get("robot", {}).get("parameter") or ()}
+    names = {f"{PARAMETER}{name}": unit for name, unit in units.items()}
+    return names | {best_name(name): unit for name, unit in names.items()}
 
 
 def columns_of(name: str, count: int) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from cspr_jax.errors import StoreError
 from cspr_jax.schema.identity import identity
-from cspr_jax.schema.quantities import AXES, QUANTITIES
+from cspr_jax.schema.quantities import QUANTITIES, is_axis
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.store.documents import Settings, document, plain_json
 from cspr_jax.store.files import guard
@@ -138,7 +138,7 @@ def _text(file: h5py.File, name: str) -> str:
 def _stored_datasets(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
     # Open only the datasets that the settings name; each is checked before its values are read.
     names = [*axes, *store]
-    if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():
+    if len({*names}) < len(names) or not all(map(is_axis, axes)) or not {*store} <= QUANTITIES.keys():
         raise DamagedError("its settings name other quantities than cspr has")
     if h5py.h5g.open(file.id, b"/").get_num_objs() != len(names):
         raise DamagedError("it holds other datasets than its settings say")

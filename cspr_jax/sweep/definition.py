@@ -6,18 +6,19 @@ import itertools
 import math
 import os
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cspr_jax import __version__
-from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.keys.parameter import with_values
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.reading import checked, parse_toml, read_text, refuse_other_kinds
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
+from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_names, axis_points
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
@@ -25,6 +26,7 @@ from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.files.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points, check_store, is_asked, is_given
+from cspr_jax.sweep.robots import check_robots, robot_of
 from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Largest number of tiles, each of which is a file.
@@ -84,25 +86,25 @@ class Sweep:
         return Layout(self.identity, self.store, self.spec.run.dtype)
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Read a sweep file and check it, without computing anything."""
+def read_sweep(path: Path, parameters: Mapping[str, float] | None = None) -> Sweep:
+    """Read a sweep file, with more values of parameters, and check it, without computing anything."""
     if len(os.fsencode(path.stem)) > LONGEST_NAME:
         raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
-    return sweep_of(parse_toml(text, path), path, text=text)
+    return sweep_of(with_values(parse_toml(text, path), parameters), path, text=text)
 
 
 def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     """Check the parsed content of a sweep file, without computing anything."""
     refuse_other_kinds(data, "sweep", path)
     spec = checked(SweepFile, data, path)
-    robot = resolve_robot(spec.robot, path, path.parent)
+    robot = resolve_robot(spec.robot, path, path.parent, spec.parameters)
     kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
     check_map(kind, spec, path)
-    robot = without_cables(robot, spec.without, path)
-    robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
+    robot = robot_of(robot, spec, kind, path)
     orientation_axes = _orientation_axes(spec) if kind.is_over_orientations else {}
-    counts = {name: _count(getattr(spec.axes, name)) for name in data["axes"]}
+    names = axis_names(data["axes"])
+    counts = {name: _count(spec.axes.named(name)) for name in names}
     counts |= {name: len(points) for name, points in orientation_axes.items()}
     check_store(kind, spec, robot, path)
     store = list(spec.run.store or _usual(kind, spec, robot))
@@ -110,8 +112,9 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     usual = tile_shape(shape, tile_cells(kind, spec, math.prod(shape)))
     tile = usual if spec.run.tile is None else _tile(spec.run.tile, shape, path)
     _check_size(counts, tile, usual, bytes_needed(shape, store, spec.run.dtype), path)
-    axes = {name: axis_points(getattr(spec.axes, name)) for name in data["axes"]}
+    axes = {name: axis_points(spec.axes.named(name)) for name in names}
     check_points(axes, path)
+    check_robots(robot, spec, kind, axes, path)
     axes |= orientation_axes
     # Leave out keys that are not given, so that keys of later versions do not change old identities.
     settings = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
@@ -127,7 +130,7 @@ def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> S
     kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
     robot = without_cables(checked(RobotFile, settings["robot"], file, at="robot"), spec.without, file)
     over_orientations = _orientation_axes(spec) if kind.is_over_orientations else {}
-    file_axes = {name: axis_points(getattr(spec.axes, name)) for name in settings["axes"]}
+    file_axes = {name: axis_points(spec.axes.named(name)) for name in axis_names(settings["axes"])}
     axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}
     check_points(file_axes, file)
     run = settings["run"]

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from cspr_jax.config.missing_cables import ANY_ONE
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.numerics.elementary import double_precision
@@ -14,6 +15,7 @@ from cspr_jax.schema.identity import digest
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
+from cspr_jax.sweep.robots import CellsOfRobots, parameter_axes, robot_at
 from cspr_jax.sweep.work import Computed
 
 # Margins this close to zero may have another sign on another processor; results contain the number of such cells.
@@ -31,8 +33,9 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            self._cells: GridMap = _map_of(sweep)
-            self._cells.refuse_hopeless(sweep.grid)
+            self._cells: GridMap | CellsOfRobots = _map_of(sweep)
+            if isinstance(self._cells, GridMap):
+                self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:
         """Compute a tile."""
@@ -57,13 +60,21 @@ class TileMap:
         )
 
 
-def _map_of(sweep: Sweep) -> GridMap:
+def _map_of(sweep: Sweep) -> GridMap | CellsOfRobots:
+    if not parameter_axes(sweep.grid.axes):
+        return _map_of_robot(sweep, sweep.robot)
+    return CellsOfRobots(
+        lambda values: _map_of_robot(sweep, robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file))
+    )
+
+
+def _map_of_robot(sweep: Sweep, robot_file: RobotFile) -> GridMap:
     make = sweep.kind.load()
     if sweep.spec.without != ANY_ONE:
-        return make(sweep.robot, sweep.spec, sweep.file)
+        return make(robot_file, sweep.spec, sweep.file)
     from cspr_jax.workspaces.any_cable_gone import AnyCableGone  # other maps do without workspaces
 
-    return AnyCableGone(make, sweep.robot, sweep.spec, sweep.file)
+    return AnyCableGone(make, robot_file, sweep.spec, sweep.file)
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:

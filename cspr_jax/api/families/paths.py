@@ -108,7 +108,7 @@ def least_time_paths(
     if not len(paths):
         raise InputError("paths", None, "must hold at least one path", problem="none")
     with double_precision():
-        file = as_moved(resolve_robot(spec.robot, NAME, Path()), [FAMILIES["path"].legs])
+        file = as_moved(resolve_robot(spec.robot, NAME, Path(), spec.parameters), [FAMILIES["path"].legs])
         problem = build_problem(file, spec, spec, NAME, any_cables=True)
         check_no_means(problem.limits, "limits.")
         axes = frame_of(file.base_points, file.z_axis)

@@ -21,6 +21,7 @@ from cspr_jax.schema.quantities import (
     AXES,
     FAILURES,
     FLIGHT,
+    PARAMETER,
     PATHS,
     QUANTITIES,
     SEGMENTS,
@@ -29,6 +30,7 @@ from cspr_jax.schema.quantities import (
     register,
 )
 from cspr_jax.store.consolidation import content_of
+from cspr_jax.store.documents import plain_json
 from cspr_jax.store.files import guard
 from cspr_jax.store.files.checksum import NO_TRAILER, DamagedError
 from cspr_jax.store.files.netcdf import UNREADABLE, reason
@@ -120,6 +122,16 @@ def _dimensions(data: h5py.Dataset) -> list[str]:
     return [Path(dimension[0].name).name for dimension in data.dims if len(dimension)]
 
 
+def _parameters(attributes: dict[str, Any]) -> list[str]:
+    # Axes of a map that are parameters of its robot, which its settings name.
+    try:
+        order = plain_json(str(attributes.get("settings"))).get("dimensions", ())
+    except (DamagedError, AttributeError):
+        return []
+    names = [name for name in order if isinstance(name, str) and name.startswith(PARAMETER)]
+    return names[: guard.LARGEST_RANK]
+
+
 def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
     if not words["has_trailer"]:
         _check_netcdf(path)
@@ -129,7 +141,9 @@ def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
         is_joined = not words["has_trailer"]
         if is_joined and not {"map", "settings"} <= attributes.keys():
             raise DamagedError("a joined map must keep the attributes of one of them: combine_attrs='override'")
-        datasets = guard.datasets(file, [name for table in tables for name in table], is_joined=is_joined)
+        parameters = _parameters(attributes) if "map" in attributes else []
+        names = [*(name for table in tables for name in table), *parameters]
+        datasets = guard.datasets(file, names, is_joined=is_joined)
         names_of_parts = [name for name in _PART_NAMES if "map" not in attributes and file.id.links.exists(name)]
         if not is_joined:
             guard.refuse_others(file, len(datasets) + len(names_of_parts), len(attributes))

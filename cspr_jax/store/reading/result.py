@@ -1,6 +1,7 @@
 """Result files: content that another process has read, checked against the schema of the program that wrote it."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +15,17 @@ from cspr_jax.errors import ConfigError, InputError, StoreError, printable, show
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
-from cspr_jax.schema.quantities import ACROSS, AXES, EVERY, OTHER_DIMS, PARTS, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import (
+    ACROSS,
+    EVERY,
+    OTHER_DIMS,
+    PARTS,
+    QUANTITIES,
+    SEGMENTS,
+    TRAJECTORY,
+    is_axis,
+    parameter_units,
+)
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.files.checksum import DamagedError
 from cspr_jax.store.reading.isolated import Reader
@@ -92,7 +103,7 @@ class Result:
             for name, choice in self.choices.items()
         }
         choices = earlier | {axis: BestPoints(points, indices)}
-        units, labels = _described(self.settings.get("map"), [*others, *choices, *data])
+        units, labels = _described(self.settings, [*others, *choices, *data])
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 
     def coordinates(self, index: tuple[int, ...]) -> dict[str, float]:
@@ -134,7 +145,7 @@ def open_result(path: Path) -> Result:
     except ConfigError as error:
         raise StoreError(str(error)) from error
     names = [*axes, *data]
-    units, labels = _described(settings.get("map"), names)
+    units, labels = _described(settings, names)
     return Result(axes, data, units, labels, attributes, settings)
 
 
@@ -144,7 +155,7 @@ def motion_result(attributes: dict[str, Any], arrays: dict[str, np.ndarray]) -> 
         axes, data = _motion(attributes, dict(sorted(arrays.items())), keeps_robot=True)
     except DamagedError as error:
         raise StoreError(f"the motion cannot be drawn: {error}") from error
-    return Result(axes, data, *_described(None, [*axes, *data]), attributes, {})
+    return Result(axes, data, *_described({}, [*axes, *data]), attributes, {})
 
 
 def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
@@ -152,10 +163,11 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[st
         return reader.result(path)
 
 
-def _described(kind: object, names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
-    # Units and long names, from the rows of the kind of map.
-    quantities = {name: quantity_of(kind, name) for name in names}
-    return {name: quantity.units for name, quantity in quantities.items()}, {
+def _described(settings: Mapping[str, Any], names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
+    # Units and long names, from the rows of the kind of map, and of parameters from the robot.
+    quantities = {name: quantity_of(settings.get("map"), name) for name in names}
+    units = parameter_units(settings)
+    return {name: units.get(name, quantity.units) for name, quantity in quantities.items()}, {
         name: quantity.long_name for name, quantity in quantities.items()
     }
 
@@ -182,7 +194,7 @@ def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
     checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
     robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
     order = settings.get("dimensions")
-    if not isinstance(order, list) or not order or not all(isinstance(name, str) and name in AXES for name in order):
+    if not isinstance(order, list) or not order or not all(map(is_axis, order)):
         raise DamagedError(f"settings.dimensions = {shown(order)}: must be a list of axes")
     for name, setting in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
         if attributes.get(name) != setting:

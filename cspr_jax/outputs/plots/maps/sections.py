@@ -33,7 +33,7 @@ from cspr_jax.outputs.plots.style.labels import (
 )
 from cspr_jax.outputs.plots.style.layout import columns_of, in_degrees, in_whole_numbers, panels, set_polar_ticks
 from cspr_jax.outputs.plots.style.word_ticks import word_scale, worded
-from cspr_jax.schema.quantities import EVERY, best_name
+from cspr_jax.schema.quantities import best_name, row_of
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
@@ -94,7 +94,7 @@ def section_figure(
     # Cells of -inf are beyond all scales, and have no colour.
     endless = np.isneginf(data) if data.dtype.kind == "f" else np.zeros(data.shape, bool)
     data = np.where(endless, np.nan, data) if endless.any() else data
-    quantity = EVERY[name]
+    quantity = row_of(name)
     meaning = worded(result, name, data)
     cells, scale = (
         (data, number_scale(result, name, data)) if meaning is None else (meaning[0], word_scale(*meaning[1:]))
@@ -171,7 +171,7 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
 
 def is_informative(name: str, data: np.ndarray) -> np.ndarray:
     """Cells that contain information: most orientations of a grid are impossible for the robot."""
-    if EVERY[name].unflagged:
+    if row_of(name).unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
 
@@ -222,7 +222,7 @@ def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
     choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
     points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))
     if not 0 < len(points) <= TOLD_APART:
-        return scale_of(values, signed=EVERY[name].signed)
+        return scale_of(values, signed=row_of(name).signed)
     shades = matplotlib.colormaps["cividis"](np.linspace(0.0, 1.0, len(points)))
     return Scale(
         ListedColormap(list(shades)).with_extremes(bad=NONE_COLOUR),

@@ -51,7 +51,7 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     text = read_text(path)
     plan_file = read_plan(text, path)
     robot_file, legs_of = (
-        resolve_robot(plan_file.robot, path, path.parent),
+        resolve_robot(plan_file.robot, path, path.parent, plan_file.parameters),
         [FAMILIES[n].legs for n in plan_file.families],
     )
     robot_file = as_moved(robot_file, legs_of, plan_file.without, path)
@@ -64,7 +64,7 @@ def with_robot(result: Result, file: str, spec: dict[str, Any]) -> Result:
     robot = spec["robot"]
     _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
     plan = checked_plan(spec, "--robot")
-    robot_file = without_cables(resolve_robot(plan.robot, "--robot", Path()), plan.without, "--robot")
+    robot_file = without_cables(resolve_robot(plan.robot, "--robot", Path(), plan.parameters), plan.without, "--robot")
     # For a platform that only translates, motion files have the cables of the equivalent point mass.
     robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
     return _with_robot_file(result, file, robot_file, "--robot", {"plan": json_text(spec)})

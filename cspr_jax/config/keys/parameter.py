@@ -1,0 +1,180 @@
+"""Parameters of robot files: named numbers that move others by given multiples; without jax."""
+
+import copy
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.wording import table_error
+from cspr_jax.errors import InputError, shown
+from cspr_jax.errors.suggestions import did_you_mean
+from cspr_jax.schema.quantities import PARAMETER
+
+LARGEST_VALUE = 1e12
+MAX_PARAMETERS, MAX_MOVES = 100, 10_000
+# Factors of points about their centroid and about the origin of the platform's axes; 1 in a file.
+SCALES = {"scale": "base_points", "platform_scale": "platform_points"}
+_PART = re.compile(r"[^.\[\]]+|\[[0-9]+\]")
+
+Value = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE)]
+# Values that a plan or a sweep gives to parameters of its robot.
+ParameterValues = Annotated[dict[str, Value], Field(min_length=1, max_length=MAX_PARAMETERS)]
+VALUES_DESCRIPTION = "{ NAME = value, ... }: values of parameters of the robot file; all others stay as in the file"
+
+
+class ParameterTable(Table):
+    """A parameter: a number between bounds, and the numbers of the file that move with it."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,49}$")] = Field(
+        description="name, of letters, digits, _ and -; `--set NAME=VALUE` and axes of sweeps use it"
+    )
+    value: Value = Field(description="value at which the numbers are those of the file")
+    lower: Value = Field(description="smallest value")
+    upper: Value = Field(description="largest value")
+    unit: Annotated[str, Field(max_length=30)] = Field("1", description="unit of the value, for people")
+    moves: Annotated[dict[str, Value], Field(min_length=1, max_length=MAX_MOVES)] = Field(
+        description="the numbers that move, each by a multiple of the change of the value: "
+        '{ "base_points[0][0]" = 0.5, "mass" = 1 }; "scale" and "platform_scale" are factors, 1 in the file, of '
+        'base_points about their centroid and of platform_points; "parameter.NAME" is the value of another parameter'
+    )
+
+    @model_validator(mode="after")
+    def _is_inside(self) -> "ParameterTable":
+        if not self.lower < self.upper:
+            raise table_error("upper", self.upper, f"a number > lower, {shown(self.lower)}")
+        if not self.lower <= self.value <= self.upper:
+            raise table_error("value", self.value, f"from lower to upper, {shown(self.lower)} to {shown(self.upper)}")
+        for target, multiple in self.moves.items():
+            if multiple == 0.0:
+                raise table_error("moves", f"{target} = 0", "numbers that are not 0, so that it moves something")
+        return self
+
+    def at(self, value: float) -> "ParameterTable":
+        """The parameter at another value, which rounding may have put beyond a bound."""
+        return self.model_copy(update={"value": min(max(value, self.lower), self.upper)})
+
+
+def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, Any]) -> None:
+    """Refuse parameters of one name, that move what is no number of the file, or that move themselves."""
+    names = [parameter.name for parameter in parameters]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise table_error(f"parameter[{i}].name", name, "a name that no other parameter has")
+    numbers = [*dict(_numbers(spec)), *(key for key, points in SCALES.items() if spec.get(points) is not None)]
+    targets = {*numbers, *(PARAMETER + name for name in names)}
+    for i, parameter in enumerate(parameters):
+        for target in parameter.moves:
+            if target not in targets:
+                hint = did_you_mean(target, sorted(targets))
+                allowed = f"{hint}numbers of the file, such as {', '.join(numbers[:2])}, or parameter.NAME"
+                raise table_error(f"parameter[{i}].moves", shown(target), allowed)
+    for i, name in enumerate(names):
+        if (cycle := _cycle(parameters, name)) is not None:
+            text = " -> ".join(cycle)
+            raise table_error(f"parameter[{i}].moves", text, "parameters that do not move themselves")
+
+
+def changed(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -> dict[str, float]:
+    """Changes of numbers of the file, by their keys, where some parameters have other values.
+
+    Raises:
+        InputError: no parameter has this name, or a value is beyond its bounds.
+    """
+    tables = {parameter.name: parameter for parameter in parameters}
+    changes: dict[str, float] = {}
+
+    def move(name: str, change: float) -> None:
+        for target, multiple in tables[name].moves.items():
+            changes[target] = changes.get(target, 0.0) + multiple * change
+            if target.startswith(PARAMETER):
+                move(target.removeprefix(PARAMETER), multiple * change)
+
+    for name, value in values.items():
+        if name not in tables:
+            hint = did_you_mean(name, tables)
+            allowed = f"{hint}one of {', '.join(tables)}" if tables else "absent: the robot file has no [[parameter]]"
+            raise InputError(f"parameters.{name}", value, allowed)
+        move(name, value - tables[name].value)
+        changes[PARAMETER + name] = changes.get(PARAMETER + name, 0.0) + value - tables[name].value
+    for name, table in tables.items():
+        value = table.value + changes.get(PARAMETER + name, 0.0)
+        slack = 1e-12 * max(abs(table.lower), abs(table.upper))
+        if not table.lower - slack <= value <= table.upper + slack:
+            allowed = f"from {shown(table.lower)} to {shown(table.upper)}"
+            raise InputError(f"parameters.{name}", value, f"{allowed}, as [[parameter]] of the robot file says")
+    return changes
+
+
+def moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, Any]:
+    """The numbers of a file after their changes; scales act last.
+
+    Raises:
+        InputError: a scale is not positive.
+    """
+    result = copy.deepcopy(dict(spec))
+    for key, change in changes.items():
+        if key in SCALES or key.startswith(PARAMETER):
+            continue
+        *parents, last = (_index(part) for part in _PART.findall(key))
+        table: Any = result
+        for part in parents:
+            table = table[part]
+        table[last] += change
+    for key, points in SCALES.items():
+        if changes.get(key, 0.0) != 0.0:
+            result[points] = _scaled(np.asarray(result[points], float), 1.0 + changes[key], key)
+    return result
+
+
+def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dict[str, Any]:
+    """A parsed plan or sweep with more values of parameters, which replace its own."""
+    if not values:
+        return spec
+    given = spec.get("parameters", {})
+    return spec | {"parameters": {**(given if isinstance(given, Mapping) else {}), **values}}
+
+
+def _scaled(points: np.ndarray, scale: float, key: str) -> list[list[float]]:
+    if not scale > 0.0:
+        raise InputError(key, scale, "a number > 0")
+    center = points.mean(0) if key == "scale" else np.zeros(points.shape[1])
+    return (center + scale * (points - center)).tolist()
+
+
+def _numbers(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    # All numbers of a parsed file, by their keys.
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _numbers(inner, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for i, inner in enumerate(value):
+            yield from _numbers(inner, f"{key}[{i}]")
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, value
+
+
+def _index(part: str) -> str | int:
+    return int(part[1:-1]) if part.startswith("[") else part
+
+
+def _cycle(parameters: Sequence[ParameterTable], first: str) -> list[str] | None:
+    # Names from a parameter back to itself; None if there is no such way.
+    moves = {
+        parameter.name: [key.removeprefix(PARAMETER) for key in parameter.moves if key.startswith(PARAMETER)]
+        for parameter in parameters
+    }
+    paths = [[first]]
+    seen: set[str] = set()
+    while paths:
+        path = paths.pop()
+        for name in moves[path[-1]]:
+            if name == first:
+                return [*path, name]
+            if name not in seen:
+                seen.add(name)
+                paths.append([*path, name])
+    return None
