@@ -107,7 +107,7 @@ def _check(compared: list[Compared], plane: list[str]) -> None:
     if not plane:
         raise InputError("results", f"{first.file} over {first.across}", "maps over two or three of x, y and z")
     for one in compared[1:]:
-        if robot_of(one.result).base_points != robot_of(first.result).base_points:
+        if robot_of(one.result, one.coordinates).base_points != robot_of(first.result, first.coordinates).base_points:
             raise InputError("results", one.file, f"of a robot with the spools of that in {first.file}")
         if set(one.across) != set(first.across):
             allowed = f"over {', '.join(first.across)}, as {first.file}; --at fixes the others"
@@ -143,7 +143,7 @@ def _agree(points: np.ndarray, others: np.ndarray) -> bool:
 def _box(compared: list[Compared], plane: list[str]) -> np.ndarray:
     # Corners (2, 2) of a rectangle around the grids, and around the spools unless these are far away.
     grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in compared for f in (np.min, np.max)])
-    base = np.array(robot_of(compared[0].result).base_points)
+    base = np.array(robot_of(compared[0].result, compared[0].coordinates).base_points)
     both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
     shown = both if (np.ptp(both, axis=0) <= LARGEST_RATIO * np.ptp(grids, axis=0)).all() else grids
     margin = MARGIN * np.ptp(shown, axis=0).max()

@@ -11,6 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.transforms import Bbox
 
 from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.outputs.plots.robots.robot_at import spools_of
 from cspr_jax.outputs.plots.style.fixed_axes import start, starts_at_rest, table
 from cspr_jax.outputs.plots.style.labels import as_drawn
 from cspr_jax.store.reading.result import Result
@@ -78,8 +79,8 @@ def marked(result: Result, name: str, across: list[str], over: str, coordinates:
 def _section(panel: Axes | None, result: Result, across: list[str], coordinates: dict[str, float]) -> _Section | None:
     # None where nothing can be marked in this space.
     space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
-    base = np.asarray(result.attributes.get("base_points", 0.0), float)
-    if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
+    base = spools_of(result, coordinates)
+    if space is None or base is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
         return None
     return _Section(panel, result, space, across, [axis.removeprefix("from_") for axis in across], coordinates, base)
 

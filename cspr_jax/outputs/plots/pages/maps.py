@@ -14,7 +14,7 @@ from cspr_jax.outputs.plots.maps.conditions import condition_phrases, is_margin,
 from cspr_jax.outputs.plots.maps.sections import in_order
 from cspr_jax.outputs.plots.pages.page import packed
 from cspr_jax.outputs.plots.robots.obstacles import COLOUR, obstacles, outline, section_of
-from cspr_jax.outputs.plots.robots.robot_at import robot_of, workspace_of
+from cspr_jax.outputs.plots.robots.robot_at import spools_of, workspace_of
 from cspr_jax.outputs.plots.style.colours import Scale, scale_of
 from cspr_jax.outputs.plots.style.fixed_axes import notes
 from cspr_jax.outputs.plots.style.labels import WORDS, as_drawn, axis_label, label, unit, value
@@ -99,7 +99,9 @@ def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
     # Spools of a workspace's robot, seen along the axis out of the plane.
     if result.attributes["map"] != WORKSPACE or "verdict" not in result.data or not set(plane) <= set(SPACE):
         return None
-    base = np.asarray(robot_of(result).base_points, float)
+    base = spools_of(result, {})
+    if base is None:
+        return None
     up, across = (base[:, SPACE.index(name)].tolist() for name in plane)
     return {"up": up, "across": across}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
+from cspr_jax.schema.quantities import PARAMETER
 from cspr_jax.store.reading.result import Result
 
 ON_ARC = 9  # number of points through which an arc is drawn, including its ends
@@ -39,9 +41,24 @@ class Posed(NamedTuple):
     edges: np.ndarray
 
 
-def robot_of(result: Result) -> RobotFile:
-    """The robot of a map."""
-    return without_cables(RobotFile(**result.settings["robot"]), result.settings.get("without"), "result")
+def robot_of(result: Result, coordinates: Mapping[str, float] | None = None) -> RobotFile:
+    """The robot of a map, in a cell where axes are parameters; those without a coordinate are as in the robot file."""
+    given = coordinates or {}
+    values = {name.removeprefix(PARAMETER): given[name] for name in given if name.startswith(PARAMETER)}
+    robot_file = RobotFile(**result.settings["robot"]).with_parameters(values)
+    return without_cables(robot_file, result.settings.get("without"), "result")
+
+
+def spools_of(result: Result, coordinates: Mapping[str, float]) -> Float[np.ndarray, "n 3"] | None:
+    """Spools of the robot in a cell; None where they depend on parameters that have no coordinate."""
+    axes = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
+    names = [name for name in axes if name.startswith(PARAMETER)]
+    if not names:
+        return np.asarray(result.attributes["base_points"], float) if "base_points" in result.attributes else None
+    given = {name: value for name, value in coordinates.items() if name not in result.choices}
+    ends = [{name: float(f(axes[name])) for name in names} | given for f in (np.min, np.max)]
+    first, last = (np.asarray(robot_of(result, end).base_points) for end in ends)
+    return first if np.array_equal(first, last) else None
 
 
 def workspace_of(result: Result) -> WorkspaceTable:
@@ -51,7 +68,7 @@ def workspace_of(result: Result) -> WorkspaceTable:
 
 def posed(result: Result, position: Float[np.ndarray, "3"], angles: dict[str, float]) -> Posed:
     """The robot of a map of a workspace, with the origin of the platform frame at a position."""
-    robot_file = robot_of(result)
+    robot_file = robot_of(result, angles)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
     quaternion = np.array(workspace_of(result).orientation or IDENTITY)

@@ -9,6 +9,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.style.fitting import shortened
+from cspr_jax.schema.quantities import PARAMETER
 from cspr_jax.store.reading.result import Result
 
 # Words for axes whose names in files are not words.
@@ -63,7 +64,11 @@ def label(result: Result, name: str) -> str:
 
 def axis_label(result: Result, axis: str) -> str:
     """The label of an axis."""
-    return WORDS.get(axis, shortened(axis)) + _in_brackets(result, axis)
+    return _name(axis) + _in_brackets(result, axis)
+
+
+def _name(axis: str) -> str:
+    return WORDS.get(axis, shortened(axis.removeprefix(PARAMETER)))
 
 
 def _in_brackets(result: Result, name: str) -> str:
@@ -101,7 +106,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
         drawn = principal_angle(drawn)
     # A point of a range across zero may differ from zero by rounding.
     drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
-    name = WORDS.get(axis, shortened(axis))
+    name = _name(axis)
     if axis == "cable":
         return f"{name} {drawn:g}"
     return f"{name} = {drawn:.{digits}g}" + (f" {symbol}" if symbol not in ("", "°") else symbol)
