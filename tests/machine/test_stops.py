@@ -5,6 +5,7 @@ import itertools
 import json
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -310,8 +311,16 @@ def test_times_and_plans_are_checked(planar):
     pose = [{"position": [x, 0.0, 1.2], "time": time} for x, time in ((0.0, 0.0), (0.1, 2.0))]
     bounded = cspr_jax.plan(spec | {"pose": pose})
     assert bounded.feasible
-    with pytest.raises(cspr_jax.errors.InputError, match=r"^plan: motor_torque_rms_max = \[50.0\]: must be absent"):
+    with pytest.raises(
+        cspr_jax.errors.InputError, match=r"^plan: motor_torque_rms_max = 50.0: must be absent, in \[winch\]"
+    ):
         cspr_jax.stops(bounded)
+
+
+@pytest.mark.thorough
+def test_the_plan_of_the_documents_has_stops():
+    path = Path(__file__).parents[2] / "docs" / "examples" / "camera_plan.toml"
+    assert cspr_jax.stops(cspr_jax.plan(path), instants=1).all_found
 
 
 def test_a_robot_that_is_of_no_use_without_a_cable_has_no_stop(tmp_path):
