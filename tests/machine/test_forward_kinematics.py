@@ -384,7 +384,7 @@ MISTAKES = {
         "^tolerance: given: must be absent beside equilibrium, which has none$",
     ),
     "nan": (([1.0, np.nan, 1.0],), {}, r"^lengths = nan: must be finite numbers"),
-    "winch": (([1.0, 1.0, 1.0],), {"angles": True}, r"^angles = true: must be False: the robot has no \[winch\]"),
+    "winch": (([1.0, 1.0, 1.0],), {"angles": True}, r"^angles: given: must be absent: the robot has no \[winch\]"),
     "start": (([1.0, 1.0, 1.0],), {"start": np.zeros((2, 3))}, r"^start: an array of shape \(2, 3\): must be \(3,\)"),
     "turn": (
         ([1.0, 1.0, 1.0],),

@@ -185,6 +185,48 @@ def test_a_log_of_one_cable_and_one_without_poses():
     assert "- mm rms, largest - mm at - s after" in " ".join(log_report.log_lines(lost))
 
 
+def test_a_cable_that_sticks_for_a_while_stands_out_beside_the_plan(planned, tmp_path):
+    spec, rows = planned
+    times, lengths, _ = _played(rows, np.random.default_rng(9), late=0.02)
+    sticks = (times > 1.0) & (times < 1.6)
+    lengths[sticks, 1] = lengths[np.argmax(sticks), 1]
+    found = cspr_jax.compare_log(_written(tmp_path / "log.csv", times, lengths), spec)
+    largest = found.to_dict()["cables"][1]["largest"]
+    assert (
+        f"; beside the plan cable 2 is off by up to {1000.0 * abs(largest):.4g} mm" in found.to_dict()["disagreement"]
+    )
+    # With a spare cable, of which no constant error explains what is left.
+    errors = np.array([[0.001, 0.3, 0.001, 0.0], [0.001, 0.0, 0.0, 0.0]])
+    spare = disagreement.Disagreement(np.zeros(4), np.full(4, 0.1), None, 0.05)
+    log = {"robot": "r", "family": "spline"}
+    log |= {"times": np.arange(2.0), "rows": np.arange(2), "n_spare": 1, "lengthened": [[]] * 4, "disagreement": spare}
+    log |= {"delay": delay.Delay(0.01, np.inf, np.nan, np.zeros(4), False), "length_errors": errors}
+    log |= {"angle_errors": None, "is_found": np.ones(2, bool), "residuals": errors, "tensions": None}
+    log |= {"planned_tensions": np.ones((2, 4)), "slack": None, "tolerance": None}
+    log |= {"position_errors": np.ones(2), "position_errors_before": np.ones(2)}
+    lines = log_report.log_lines(log_report.ComparedLog(**log))
+    assert lines[1] == "delay: 10 ms late, standard deviation unknown"
+    assert lines[3].startswith(
+        "no constant error of one cable explains the 50 mm rms that no pose explains; beside the"
+    )
+    assert lines[3].endswith("cable 2 is off by up to 300 mm at 0 s, others by up to 1 mm")
+
+
+def test_poses_from_angles_say_that_they_leave_out_the_stretch(tmp_path, capsys):
+    robot = tmp_path / "elastic.toml"
+    spools = "[[0.2, -0.1, 0.0], [-0.2, -0.1, 0.0], [0.0, 0.3, 0.0]]"
+    keys = f'name = "e"\nmass = 1.0\nbase_points = {spools}\n'
+    robot.write_text(keys + "axial_stiffness = 1e4\n[winch]\ndrum_radius = 0.02\nzero_length = 1.0\n")
+    assert main(["locate", str(robot), "--angles", "5,5,5"]) == 0
+    assert "angles give their unstretched lengths, so that the poses leave out the stretch" in capsys.readouterr().out
+    assert main(["locate", str(robot), "--angles=-50,5,5"]) == 2
+    assert "--angles: angles[0, 0] = -50.0: must be an angle that gives a length > 0" in capsys.readouterr().err
+    assert main(["locate", str(robot), "--lengths", "1,1,-1"]) == 2
+    assert "--lengths: lengths[0, 2] = -1.0: must be a length > 0" in capsys.readouterr().err
+    assert main(["locate", "prototype", "--angles", "1,2,3"]) == 2
+    assert "--angles: angles: given: must be absent: the robot has no [winch]" in capsys.readouterr().err
+
+
 def test_angles_of_motors_are_logs(planned, tmp_path):
     spec, rows = planned
     winch = {"drum_radius": 0.02, "gear_ratio": 3.0, "zero_length": 1.0, "direction": [1, -1, 1]}
@@ -195,7 +237,7 @@ def test_angles_of_motors_are_logs(planned, tmp_path):
     path = _written(tmp_path / "log.csv", times, angles, name="angle")
     found = cspr_jax.compare_log(path, spec | {"robot": robot})
     assert abs(found.delay.value - 0.02) < 1e-3 and found.position_errors.max() < 0.002
-    with pytest.raises(ConfigError, match=r"log.csv: angles = true: must be False: the robot has no \[winch\]"):
+    with pytest.raises(ConfigError, match=r"log.csv: angles: given: must be absent: the robot has no \[winch\]"):
         cspr_jax.compare_log(path, spec)
 
 

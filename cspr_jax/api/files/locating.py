@@ -21,6 +21,7 @@ from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
 
 MOST_SHOWN = 20  # rows of the table for a terminal
+ELASTIC = "cables are elastic: angles give their unstretched lengths, so that the poses leave out the stretch"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,6 +161,8 @@ def located(
         if len(measured) != robot.n_cables:
             option = "--angles" if angles else "--lengths"
             raise ConfigError(option, f"{len(measured)} numbers: must be {robot.n_cables}, one a cable")
+    if angles and robot.axial_stiffness is not None:
+        notes = (*notes, ELASTIC)
     settings: dict[str, Any] = {}
     if start is not None:
         settings["start"] = start[:3]
@@ -169,6 +172,10 @@ def located(
     try:
         with double_precision():
             values = checked_lengths(robot, values, is_angle=angles, lines=lines)
+    except InputError as error:
+        option = "--angles" if angles else "--lengths"
+        raise ConfigError(measured if isinstance(measured, Path) else option, str(error)) from error
+    try:
         answers = forward(robot, values, all_solutions=all_solutions, equilibrium=slack, **settings)
     except InputError as error:
         raise ConfigError(measured if isinstance(measured, Path) else reference, str(error)) from error

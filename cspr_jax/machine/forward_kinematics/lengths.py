@@ -23,7 +23,8 @@ def lengths_of(robot: Any, source: ArrayLike, *, is_angle: bool) -> Float[np.nda
         raise InputError("lengths", None, allowed, problem=f"an array of shape {np.shape(source)}")
     if is_angle:
         if robot.winches is None:
-            raise InputError("angles", True, "False: the robot has no [winch], which gives lengths of angles")
+            allowed = "must be absent: the robot has no [winch], which gives lengths of angles"
+            raise InputError("angles", None, allowed, problem="given")
         values = np.asarray(jax.vmap(lambda row: cable_lengths(robot.winches, row))(values))
     return values
 
@@ -40,7 +41,7 @@ def checked_lengths(
     allowed = "a length > 0, at most 1e6 m"
     if is_angle:
         allowed = f"an angle that gives {allowed}, not {values[row, cable]:.9g} m"
-    key = f"lengths[{row}, {cable}]"
+    key = f"{'angles' if is_angle else 'lengths'}[{row}, {cable}]"
     if lines is not None:
         key = f"line {lines[row]}: {'angle' if is_angle else 'length'}_{cable + 1}"
     raise InputError(key, float(sources[row, cable]), allowed)

@@ -160,7 +160,7 @@ def disagreement_words(log: ComparedLog) -> str:
     disagreement, off = log.disagreement, _off_plan(log)
     beside = "" if off is None else f"cable {off + 1} is {_off_words(log.delay.offsets[off])} beside the plan's"
     if disagreement is None:
-        alternative = f"; {beside}, or the pose is off the plan" if beside else ""
+        alternative = (f"; {beside}, or the pose is off the plan" if beside else "") + _stray_words(log)
         return f"which cable disagrees cannot be told with as many cables as degrees of freedom{alternative}"
     k, alike = disagreeing_cable(log), _alike(disagreement)
     if k is None and len(alike) > 1:
@@ -168,11 +168,23 @@ def disagreement_words(log: ComparedLog) -> str:
         alone = f"each alone explains {disagreement.fractions.max():.0%} of what no pose explains"
         return f"one of cables {names} disagrees: {alone}"
     if k is None:
-        return f"no cable disagrees more than the others: {_mm(disagreement.spread)} mm rms that no pose explains"
+        unexplained = f"{_mm(disagreement.spread)} mm rms that no pose explains"
+        return f"no constant error of one cable explains the {unexplained}{_stray_words(log)}"
     others = np.delete(disagreement.fractions, k)
     words = f"cable {k + 1} disagrees: its lengths are {_off_words(disagreement.errors[k])}, which alone explains"
     words += f" {disagreement.fractions[k]:.0%} of what no pose explains (next cable {others.max():.0%})"
     return words if disagreement.cable is not None else f"{words}; of cables alike in this, {beside}"
+
+
+def _stray_words(log: ComparedLog) -> str:
+    # The cable that at some time strays far more from the plan than any other, and than on average: one that sticks.
+    rows = [_cable(log, k) for k in range(log.length_errors.shape[1])]
+    first, *others = sorted(rows, key=lambda row: -abs(row["largest"]))
+    next_largest = abs(others[0]["largest"]) if others else math.inf
+    if abs(first["largest"]) <= OFF_PLAN * max(next_largest, abs(first["offset"])):
+        return ""
+    where = f"up to {_mm(abs(first['largest']))} mm at {_number(first['t'])} s, others by up to {_mm(next_largest)} mm"
+    return f"; beside the plan cable {first['cable'] + 1} is off by {where}"
 
 
 def _off_words(error: float) -> str:
@@ -203,7 +215,8 @@ def _delay_words(delay: Delay) -> str:
     if math.isnan(delay.value):
         return "delay: cannot be told, since no length changes"
     late = "late" if delay.value >= 0.0 else "early"
-    words = f"delay: {1000.0 * abs(delay.value):.4g} ms {late}, standard deviation {1000.0 * delay.deviation:.2g} ms"
+    spread = f"{1000.0 * delay.deviation:.2g} ms" if math.isfinite(delay.deviation) else "unknown"
+    words = f"delay: {1000.0 * abs(delay.value):.4g} ms {late}, standard deviation {spread}"
     rival = f"; {1000.0 * delay.rival:.4g} ms fits nearly as well" if math.isfinite(delay.rival) else ""
     return words + rival
 
