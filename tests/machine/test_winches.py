@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.errors import InputError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.robots.model import winches as w
 
 SPOOLS = [[0.23, -0.13, 0.0], [-0.23, -0.13, 0.0], [0.0, 0.26, 0.0]]
@@ -105,6 +105,15 @@ def test_wrong_numbers_are_refused(changes, words):
     with pytest.raises(InputError) as caught:
         _winches(**changes)
     assert str(caught.value).startswith(words)
+
+
+@pytest.mark.parametrize("value", [2.0, 0.0, -7.0])
+def test_directions_in_files_are_1_or_minus_1(tmp_path, value):
+    path = tmp_path / "r.toml"
+    keys = f'name = "r"\nmass = 1.0\nbase_points = {SPOOLS}\n'
+    path.write_text(f"{keys}[winch]\ndrum_radius = 0.02\ndirection = {value}\n")
+    with pytest.raises(ConfigError, match=rf"r.toml: winch.direction = {value}: must be 1 or -1, or one per cable$"):
+        cspr_jax.load_robot(path)
 
 
 def test_a_pair_of_cables_is_on_one_winch():

@@ -1,6 +1,6 @@
 """Keys of winches in robot files: the rows of `robots.model.winch_numbers`, with limits; without jax."""
 
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import Field, create_model, model_validator
 
@@ -10,8 +10,7 @@ from cspr_jax.config.wording import table_error
 from cspr_jax.robots.model.winch_numbers import LINE, LOAD, WINCH_LIMITS, WINCH_NUMBERS, missing_number
 from cspr_jax.schema.limits import LIMITS
 
-_Sign = Annotated[float, Field(ge=-1, le=1)]
-Signs: Any = one_or_each(_Sign, _Sign)
+Signs: Any = one_or_each(float, float)
 ROWS = (*WINCH_NUMBERS, *WINCH_LIMITS)
 WORDS = {row.name: row.description for row in LIMITS if row.of_winch}
 

@@ -94,7 +94,9 @@ def _drums(
     wound, buildup = MM * (winch["cable_length"] - lengths), diameter / (np.pi * winch["layer_turns"])
     for k in np.flatnonzero(wound < 0.0):
         allowed = f"at least {lengths[k]:.4g} m, the distance of cable {k + 1} from home"
-        raise ConfigError("winch.cable_length", f"{winch['cable_length'][k]:g}: must be {allowed}")
+        raise ConfigError(
+            "robot", f"{robot_file.name}: winch.cable_length = {winch['cable_length'][k]:g}: must be {allowed}"
+        )
     return np.sqrt((radius - 0.5 * diameter) ** 2 + buildup * wound), buildup
 
 
