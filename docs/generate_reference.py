@@ -11,6 +11,7 @@ from cspr_jax.config.keys.obstacles import ObstacleTable
 from cspr_jax.config.keys.path import PathTable, TargetPath
 from cspr_jax.config.keys.pose import Pose
 from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude
+from cspr_jax.config.keys.winch import WinchTable
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.plan import DepthRule, PlanFile
 from cspr_jax.config.robot import RobotFile
@@ -72,7 +73,7 @@ FILES = {
         ("amplitude, with a parameter", NamedAmplitude),
         ("amplitude, your own", PolynomialAmplitude),
     ],
-    "Robot files": [("", RobotFile)],
+    "Robot files": [("", RobotFile), ("[winch]", WinchTable)],
 }
 
 HEAD = """# Reference

@@ -155,7 +155,13 @@ TRAJECTORY = {
         Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
         Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
         Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
-        Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
+        Quantity(
+            "quaternion",
+            "1",
+            "orientation",
+            "Unit quaternion of the platform (w, x, y, z), counted from its reference orientation, unless the plan "
+            'says point = "origin".',
+        ),
         Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
         Quantity(
             "omega_dot",

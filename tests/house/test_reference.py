@@ -10,6 +10,7 @@ import h5py
 import pytest
 
 import cspr_jax
+from cspr_jax.config.keys.winch import ROWS
 from cspr_jax.outputs.plan_report import plan_object
 
 ROOT = Path(__file__).parents[2]
@@ -33,6 +34,11 @@ def reference():
     finally:
         sys.path.pop(0)
     return reference_text()
+
+
+def test_every_key_of_a_winch_is_in_the_reference(reference):
+    table = fields_of(reference, "`[winch]`: Winches of the cables: drums, gears and motors.")
+    assert table == {row.name for row in ROWS}
 
 
 def named(text: str) -> set[str]:

@@ -37,7 +37,9 @@ class Pose(Table):
         "direction of the target seen from the vertical through the centroid",
     )
     quaternion: Quaternion | None = Field(
-        None, description="platform: orientation [w, x, y, z], a unit quaternion, in place of tilt_torsion"
+        None,
+        description="platform: orientation [w, x, y, z], a unit quaternion, in place of tilt_torsion; it counts "
+        "from the reference orientation",
     )
     beta_hat: BetaHat | None = Field(
         None,
