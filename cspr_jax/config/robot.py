@@ -27,6 +27,7 @@ from cspr_jax.config.keys.parameter import (
     changed,
     check_parameters,
     moved,
+    moved_parameters,
 )
 from cspr_jax.config.keys.winch import WinchTable
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
@@ -36,7 +37,6 @@ from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.model.parallel_pairs import COUNT, ParallelPairs, parallel_pairs
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.quantities import PARAMETER
 
 SMALLEST_COUNTS = "least numbers of cables are " + ", ".join(
     f"{row.dof} ({row.description})" for row in PATTERNS.values()
@@ -319,18 +319,16 @@ class RobotFile(LimitKeys):
         Raises:
             InputError: no parameter has this name, a value is beyond its bounds, or there is no such robot.
         """
-        if not values:
-            return self
-        parameters = self.parameter or []
+        parameters, spec = self.parameter or [], self.model_dump(exclude_none=True, exclude={"parameter"})
         changes = changed(parameters, values)
+        if not any(changes.values()):
+            return self
         try:
-            spec = moved(self.model_dump(exclude_none=True, exclude={"parameter"}), changes)
-            robot_file = checked(RobotFile, spec, "robot")
+            robot_file = checked(RobotFile, moved(spec, changes), "robot")
         except ConfigError as error:
             problem = str(error).removeprefix("robot: ")
             raise InputError("parameters", dict(values), "values that give a robot", problem=problem) from error
-        tables = [table.at(table.value + changes.get(PARAMETER + table.name, 0.0)) for table in parameters]
-        robot_file = robot_file.model_copy(update={"parameter": tables})
+        robot_file = robot_file.model_copy(update={"parameter": moved_parameters(parameters, spec, changes)})
         robot_file._file, robot_file._notes = self._file, self._notes
         return robot_file
 

@@ -130,10 +130,12 @@ class Merged:
         self._owner = np.full(self.sweep.grid.shape, -1, np.int32)
         self._data = {name: np.zeros(self.sweep.grid.shape, kind) for name, kind in self.sweep.types.items()}
         for number, part in enumerate(parts):
-            cells = np.ix_(*(np.searchsorted(axes[name], points) for name, points in part.sweep.grid.axes.items()))
-            if part.sweep.identity == self.sweep.identity:
-                cells = np.ix_(*(np.arange(n) for n in self.sweep.grid.shape))
-            self._take(number, part, cells)
+            # The joined axis is sorted; the others are as in all parts, in any order.
+            indices = (
+                np.arange(len(points)) if np.array_equal(points, axes[name]) else np.searchsorted(axes[name], points)
+                for name, points in part.sweep.grid.axes.items()
+            )
+            self._take(number, part, np.ix_(*indices))
         tiling = self.sweep.grid.tiling
         missing = [index for index, region in enumerate(tiling) if (self._owner[region] < 0).any()]
         if missing:

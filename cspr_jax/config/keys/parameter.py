@@ -38,8 +38,9 @@ class ParameterTable(Table):
     unit: Annotated[str, Field(max_length=30)] = Field("1", description="unit of the value, for people")
     moves: Annotated[dict[str, Value], Field(min_length=1, max_length=MAX_MOVES)] = Field(
         description="the numbers that move, each by a multiple of the change of the value: "
-        '{ "base_points[0][0]" = 0.5, "mass" = 1 }; "scale" and "platform_scale" are factors, 1 in the file, of '
-        'base_points about their centroid and of platform_points; "parameter.NAME" is the value of another parameter'
+        '{ "base_points[0][0]" = 0.5, "mass" = 1 }; "scale" is a factor, 1 in the file, by which base_points move away '
+        'from their centroid, and "platform_scale" one by which platform_points move away from the origin; '
+        '"parameter.NAME" is the value of another parameter'
     )
 
     @model_validator(mode="after")
@@ -52,10 +53,6 @@ class ParameterTable(Table):
             if multiple == 0.0:
                 raise table_error("moves", f"{target} = 0", "numbers that are not 0, so that it moves something")
         return self
-
-    def at(self, value: float) -> "ParameterTable":
-        """The parameter at another value, which rounding may have put beyond a bound."""
-        return self.model_copy(update={"value": min(max(value, self.lower), self.upper)})
 
 
 def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, Any]) -> None:
@@ -110,24 +107,52 @@ def changed(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -
 
 
 def moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, Any]:
-    """The numbers of a file after their changes; scales act last.
+    """The numbers of a file after their changes.
 
     Raises:
         InputError: a scale is not positive.
     """
     result = copy.deepcopy(dict(spec))
     for key, change in changes.items():
-        if key in SCALES or key.startswith(PARAMETER):
+        if key.startswith(PARAMETER):
             continue
-        *parents, last = (_index(part) for part in _PART.findall(key))
-        table: Any = result
-        for part in parents:
-            table = table[part]
-        table[last] += change
-    for key, points in SCALES.items():
-        if changes.get(key, 0.0) != 0.0:
-            result[points] = _scaled(np.asarray(result[points], float), 1.0 + changes[key], key)
+        if key in SCALES and not 1.0 + change > 0.0:
+            raise InputError(key, 1.0 + change, "a number > 0")
+        for number, multiple in _numbers_of(key, spec):
+            *parents, last = (_index(part) for part in _PART.findall(number))
+            table: Any = result
+            for part in parents:
+                table = table[part]
+            table[last] += multiple * change
     return result
+
+
+def moved_parameters(
+    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], changes: Mapping[str, float]
+) -> list[ParameterTable]:
+    """The parameters of a robot whose numbers have moved: numbers still move by the same multiples."""
+    tables = []
+    for table in parameters:
+        moves: dict[str, float] = {}
+        for key, multiple in table.moves.items():
+            for number, factor in _numbers_of(key, spec):
+                moves[number] = moves.get(number, 0.0) + factor * multiple
+        value = table.value + changes.get(PARAMETER + table.name, 0.0)
+        inside = min(max(value, table.lower), table.upper)  # rounding may have put it beyond a bound
+        tables.append(table.model_copy(update={"value": inside, "moves": moves}))
+    return tables
+
+
+def _numbers_of(key: str, spec: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    # Numbers that a target stands for, with factors: a scale moves points away from their center.
+    if key not in SCALES:
+        yield key, 1.0
+        return
+    points = np.asarray(spec[SCALES[key]], float)
+    arms = points - points.mean(0) if key == "scale" else points
+    for (i, j), arm in np.ndenumerate(arms):
+        if arm != 0.0:
+            yield f"{SCALES[key]}[{i}][{j}]", float(arm)
 
 
 def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dict[str, Any]:
@@ -136,13 +161,6 @@ def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dic
         return spec
     given = spec.get("parameters", {})
     return spec | {"parameters": {**(given if isinstance(given, Mapping) else {}), **values}}
-
-
-def _scaled(points: np.ndarray, scale: float, key: str) -> list[list[float]]:
-    if not scale > 0.0:
-        raise InputError(key, scale, "a number > 0")
-    center = points.mean(0) if key == "scale" else np.zeros(points.shape[1])
-    return (center + scale * (points - center)).tolist()
 
 
 def _numbers(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
