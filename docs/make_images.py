@@ -39,6 +39,7 @@ class Image(NamedTuple):
 
 IMAGES = {
     "minimum_arcs": Image("Smallest number of arcs at six heights; P0 and the start are marked at their own.", 20),
+    "spool_triangle": Image("Smallest number of arcs on triangles of spools of six sizes.", 30, "--best z0"),
     "poses": Image(
         "Smallest number of arcs from rest to poses of a rigid platform, tilted by 46° in four directions.",
         40,

@@ -21,14 +21,7 @@ from cspr_jax.config.keys.limits import (
     Point,
     Positive,
 )
-from cspr_jax.config.keys.parameter import (
-    MAX_PARAMETERS,
-    ParameterTable,
-    changed,
-    check_parameters,
-    moved,
-    moved_parameters,
-)
+from cspr_jax.config.keys.parameter import MAX_PARAMETERS, ParameterTable, check_bounds, check_parameters, moved
 from cspr_jax.config.keys.winch import WinchTable
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
 from cspr_jax.config.wording import table_error
@@ -300,17 +293,7 @@ class RobotFile(LimitKeys):
             return self
         spec = self.model_dump(exclude_none=True, exclude={"parameter"})
         check_parameters(self.parameter, spec)
-        for i, parameter in enumerate(self.parameter):
-            for bound in ("lower", "upper"):
-                value = getattr(parameter, bound)
-                try:
-                    alone = changed(self.parameter, {parameter.name: value})
-                    checked(RobotFile, moved(spec, alone), "robot")
-                except (ConfigError, InputError) as error:
-                    reason = str(error).removeprefix("robot: ")
-                    raise table_error(
-                        f"parameter[{i}].{bound}", value, f"a value that gives a robot ({reason})"
-                    ) from error
+        check_bounds(self.parameter, spec, _of_numbers)
         return self
 
     def with_parameters(self, values: Mapping[str, float]) -> "RobotFile":
@@ -319,16 +302,14 @@ class RobotFile(LimitKeys):
         Raises:
             InputError: no parameter has this name, a value is beyond its bounds, or there is no such robot.
         """
-        parameters, spec = self.parameter or [], self.model_dump(exclude_none=True, exclude={"parameter"})
-        changes = changed(parameters, values)
-        if not any(changes.values()):
+        spec = self.model_dump(exclude_none=True, exclude={"parameter"})
+        there = moved(self.parameter or [], spec, values)
+        if there is None:
             return self
         try:
-            robot_file = checked(RobotFile, moved(spec, changes), "robot")
+            robot_file = _of_numbers(there[0]).model_copy(update={"parameter": there[1]})
         except ConfigError as error:
-            problem = str(error).removeprefix("robot: ")
-            raise InputError("parameters", dict(values), "values that give a robot", problem=problem) from error
-        robot_file = robot_file.model_copy(update={"parameter": moved_parameters(parameters, spec, changes)})
+            raise InputError("parameters", dict(values), "values that give a robot", problem=str(error)) from error
         robot_file._file, robot_file._notes = self._file, self._notes
         return robot_file
 
@@ -342,6 +323,14 @@ class RobotFile(LimitKeys):
         if error.problem or value is None:
             return f"robot.{error}"
         return f"robot.{error.key} = {shown(value)}: {demand(error.allowed)}"
+
+
+def _of_numbers(spec: dict[str, Any]) -> RobotFile:
+    # Errors name no file: the numbers are those of a file, moved.
+    try:
+        return checked(RobotFile, spec, "")
+    except ConfigError as error:
+        raise ConfigError("robot", error.lines[0].removeprefix(": ")) from error
 
 
 def _check_level(points: list[Point]) -> None:

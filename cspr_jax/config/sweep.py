@@ -121,10 +121,10 @@ class Axes(Table):
         named = {name: axis for name, axis in data.items() if name.startswith(PARAMETER)}
         if not named:
             return data
-        given = data.get("parameter")
+        table = data.get("parameter")
         axes = {name.removeprefix(PARAMETER): axis for name, axis in named.items()}
         others = {name: axis for name, axis in data.items() if name not in named}
-        return others | {"parameter": {**(given if isinstance(given, dict) else {}), **axes}}
+        return others | {"parameter": {**(table if isinstance(table, dict) else {}), **axes}}
 
     @model_serializer(mode="wrap")
     def _named(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -83,13 +83,13 @@ class CellsOfRobots:
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `maps.grid_map.GridMap.contradictions`."""
-        found: dict[str, np.ndarray] = {}
+        errors: dict[str, np.ndarray] = {}
         count = sum(len(index) for _, index in self._parts)
         for cells_of_robot, index in self._parts:
             of_robot = {name: values[index] for name, values in answers.items()}
             for error, cells in cells_of_robot.contradictions(of_robot).items():
-                found.setdefault(error, np.zeros(count, bool))[index] = cells
-        return found
+                errors.setdefault(error, np.zeros(count, bool))[index] = cells
+        return errors
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
         """Number of cells whose verdict is not proved; see `maps.grid_map.GridMap.undecided`."""

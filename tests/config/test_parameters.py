@@ -205,7 +205,7 @@ WRONG = [
     (_with(moves={"masss": 1.0}), 'parameter[0].moves = "masss": did you mean mass?'),
     (_with(moves={"platform_scale": 1.0}), 'parameter[0].moves = "platform_scale": '),
     (_with(moves={"name": 1.0}), 'parameter[0].moves = "name": '),
-    (_with(moves={"mass": -1.0}), "parameter[0].upper = 2.0: must be a value that gives a robot (mass = -0.8"),
+    (_with(moves={"mass": -1.0}), "parameter[0].upper = 2.0: must be a value that gives a robot (robot: mass = -0.8"),
     (_with(moves={"scale": 4.0}), "parameter[0].lower = 0.5: must be a value that gives a robot (scale = -1.0"),
     (_with(moves={"parameter.width": 1.0}), "parameter[0].moves = width -> width: must be parameters that do not"),
     ({"parameter": [*_with()["parameter"], *_with()["parameter"]]}, "parameter[1].name = width: must be a name that"),
@@ -230,7 +230,7 @@ def test_parameters_that_move_each_other_are_refused():
 def test_a_corner_of_the_bounds_may_give_no_robot():
     both = [_with(name=name, moves={"mass": -0.12}, value=1.0)["parameter"][0] for name in ("one", "other")]
     robot = checked(RobotFile, tomllib.loads(ROBOT) | {"parameter": both}, "robot.toml")
-    with pytest.raises(InputError, match=r"parameters: mass = -0.0\d*: .*: values that give a robot"):
+    with pytest.raises(InputError, match=r"parameters: robot: mass = -0.0\d*: .*: values that give a robot"):
         robot.with_parameters({"one": 2.0, "other": 2.0})
 
 

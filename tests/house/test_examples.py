@@ -35,7 +35,8 @@ def test_copies_work_elsewhere_and_overwrite_nothing(tmp_path, capsys):
     assert main(["examples", "dmo", "-o", str(place)]) == 2
     assert "did you mean demo?" in capsys.readouterr().err
     # No path leads out of the folder that they are copied from.
-    assert {read_toml(path)["robot"] for path in example_files.folder().glob("*.toml")} <= set(catalogue_names())
+    robots = [read_toml(path)["robot"] for path in example_files.folder().glob("*.toml")]
+    assert {robot for robot in robots if not isinstance(robot, dict)} <= set(catalogue_names())
 
 
 def test_version_and_platforms(capsys, monkeypatch):

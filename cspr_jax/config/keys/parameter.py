@@ -2,7 +2,7 @@
 
 import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,12 +10,14 @@ from pydantic import Field, model_validator
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
-from cspr_jax.errors import InputError, shown
+from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.schema.quantities import PARAMETER
 
 LARGEST_VALUE = 1e12
 MAX_PARAMETERS, MAX_MOVES = 100, 10_000
+# Fraction of the bounds by which rounding may put a value beyond them.
+ROUNDING = 1e-12
 # Factors of points about their centroid and about the origin of the platform's axes; 1 in a file.
 SCALES = {"scale": "base_points", "platform_scale": "platform_points"}
 _PART = re.compile(r"[^.\[\]]+|\[[0-9]+\]")
@@ -75,43 +77,61 @@ def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, An
             raise table_error(f"parameter[{i}].moves", text, "parameters that do not move themselves")
 
 
-def changed(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -> dict[str, float]:
-    """Changes of numbers of the file, by their keys, where some parameters have other values.
+def check_bounds(
+    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], check: Callable[[dict[str, Any]], object]
+) -> None:
+    """Refuse parameters one of whose bounds alone moves the numbers of a file so that a check refuses them."""
+    for i, parameter in enumerate(parameters):
+        for bound in ("lower", "upper"):
+            value = getattr(parameter, bound)
+            try:
+                check(_moved(spec, _changes(parameters, {parameter.name: value})))
+            except (ConfigError, InputError) as error:
+                allowed = f"a value that gives a robot ({error})"
+                raise table_error(f"parameter[{i}].{bound}", value, allowed) from error
+
+
+def moved(
+    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], values: Mapping[str, float]
+) -> tuple[dict[str, Any], list[ParameterTable]] | None:
+    """The numbers of a file at other values of its parameters, and its parameters there; None if nothing changes.
 
     Raises:
-        InputError: no parameter has this name, or a value is beyond its bounds.
+        InputError: no parameter has this name, a value is beyond its bounds, or a scale is not positive.
     """
+    changes = _changes(parameters, values)
+    if not any(changes.values()):
+        return None
+    return _moved(spec, changes), [_moved_parameter(table, spec, changes) for table in parameters]
+
+
+def _changes(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -> dict[str, float]:
+    # Changes of numbers of the file, and of values of parameters, by their keys.
     tables = {parameter.name: parameter for parameter in parameters}
     changes: dict[str, float] = {}
 
-    def move(name: str, change: float) -> None:
-        for target, multiple in tables[name].moves.items():
-            changes[target] = changes.get(target, 0.0) + multiple * change
-            if target.startswith(PARAMETER):
-                move(target.removeprefix(PARAMETER), multiple * change)
+    def move(key: str, change: float) -> None:
+        changes[key] = changes.get(key, 0.0) + change
+        if key.startswith(PARAMETER):
+            for target, multiple in tables[key.removeprefix(PARAMETER)].moves.items():
+                move(target, multiple * change)
 
     for name, value in values.items():
         if name not in tables:
             hint = did_you_mean(name, tables)
             allowed = f"{hint}one of {', '.join(tables)}" if tables else "absent: the robot file has no [[parameter]]"
             raise InputError(f"parameters.{name}", value, allowed)
-        move(name, value - tables[name].value)
-        changes[PARAMETER + name] = changes.get(PARAMETER + name, 0.0) + value - tables[name].value
+        move(PARAMETER + name, value - tables[name].value)
     for name, table in tables.items():
         value = table.value + changes.get(PARAMETER + name, 0.0)
-        slack = 1e-12 * max(abs(table.lower), abs(table.upper))
+        slack = ROUNDING * max(abs(table.lower), abs(table.upper))
         if not table.lower - slack <= value <= table.upper + slack:
-            allowed = f"from {shown(table.lower)} to {shown(table.upper)}"
-            raise InputError(f"parameters.{name}", value, f"{allowed}, as [[parameter]] of the robot file says")
+            allowed = f"from {shown(table.lower)} to {shown(table.upper)}, as [[parameter]] of the robot file says"
+            raise InputError(f"parameters.{name}", value, allowed)
     return changes
 
 
-def moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, Any]:
-    """The numbers of a file after their changes.
-
-    Raises:
-        InputError: a scale is not positive.
-    """
+def _moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, Any]:
     result = copy.deepcopy(dict(spec))
     for key, change in changes.items():
         if key.startswith(PARAMETER):
@@ -127,40 +147,37 @@ def moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, An
     return result
 
 
-def moved_parameters(
-    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], changes: Mapping[str, float]
-) -> list[ParameterTable]:
-    """The parameters of a robot whose numbers have moved: numbers still move by the same multiples."""
-    tables = []
-    for table in parameters:
-        moves: dict[str, float] = {}
-        for key, multiple in table.moves.items():
-            for number, factor in _numbers_of(key, spec):
-                moves[number] = moves.get(number, 0.0) + factor * multiple
-        value = table.value + changes.get(PARAMETER + table.name, 0.0)
-        inside = min(max(value, table.lower), table.upper)  # rounding may have put it beyond a bound
-        tables.append(table.model_copy(update={"value": inside, "moves": moves}))
-    return tables
+def _moved_parameter(
+    parameter: ParameterTable, spec: Mapping[str, Any], changes: Mapping[str, float]
+) -> ParameterTable:
+    # Numbers still move by the same multiples, so that scales, which depend on where points are, become numbers.
+    moves: dict[str, float] = {}
+    for key, multiple in parameter.moves.items():
+        for number, factor in _numbers_of(key, spec):
+            moves[number] = moves.get(number, 0.0) + factor * multiple
+    value = parameter.value + changes.get(PARAMETER + parameter.name, 0.0)
+    inside = min(max(value, parameter.lower), parameter.upper)
+    return parameter.model_copy(update={"value": inside, "moves": moves})
 
 
-def _numbers_of(key: str, spec: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+def _numbers_of(target: str, spec: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     # Numbers that a target stands for, with factors: a scale moves points away from their center.
-    if key not in SCALES:
-        yield key, 1.0
+    if target not in SCALES:
+        yield target, 1.0
         return
-    points = np.asarray(spec[SCALES[key]], float)
-    arms = points - points.mean(0) if key == "scale" else points
+    points = np.asarray(spec[SCALES[target]], float)
+    arms = points - points.mean(0) if target == "scale" else points
     for (i, j), arm in np.ndenumerate(arms):
         if arm != 0.0:
-            yield f"{SCALES[key]}[{i}][{j}]", float(arm)
+            yield f"{SCALES[target]}[{i}][{j}]", float(arm)
 
 
 def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dict[str, Any]:
     """A parsed plan or sweep with more values of parameters, which replace its own."""
     if not values:
         return spec
-    given = spec.get("parameters", {})
-    return spec | {"parameters": {**(given if isinstance(given, Mapping) else {}), **values}}
+    earlier = spec.get("parameters", {})
+    return spec | {"parameters": {**(earlier if isinstance(earlier, Mapping) else {}), **values}}
 
 
 def _numbers(value: Any, key: str = "") -> Iterator[tuple[str, float]]:

@@ -43,8 +43,8 @@ class Posed(NamedTuple):
 
 def robot_of(result: Result, coordinates: Mapping[str, float] | None = None) -> RobotFile:
     """The robot of a map, in a cell where axes are parameters; those without a coordinate are as in the robot file."""
-    given = coordinates or {}
-    values = {name.removeprefix(PARAMETER): given[name] for name in given if name.startswith(PARAMETER)}
+    cell = coordinates or {}
+    values = {name.removeprefix(PARAMETER): cell[name] for name in cell if name.startswith(PARAMETER)}
     robot_file = RobotFile(**result.settings["robot"]).with_parameters(values)
     return without_cables(robot_file, result.settings.get("without"), "result")
 
@@ -55,8 +55,8 @@ def spools_of(result: Result, coordinates: Mapping[str, float]) -> Float[np.ndar
     names = [name for name in axes if name.startswith(PARAMETER)]
     if not names:
         return np.asarray(result.attributes["base_points"], float) if "base_points" in result.attributes else None
-    given = {name: value for name, value in coordinates.items() if name not in result.choices}
-    ends = [{name: float(f(axes[name])) for name in names} | given for f in (np.min, np.max)]
+    fixed = {name: value for name, value in coordinates.items() if name not in result.choices}
+    ends = [{name: float(f(axes[name])) for name in names} | fixed for f in (np.min, np.max)]
     first, last = (np.asarray(robot_of(result, end).base_points) for end in ends)
     return first if np.array_equal(first, last) else None
 
