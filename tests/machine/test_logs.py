@@ -227,6 +227,25 @@ def test_poses_from_angles_say_that_they_leave_out_the_stretch(tmp_path, capsys)
     assert "--angles: angles: given: must be absent: the robot has no [winch]" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("with_tensions", [False, True])
+def test_stretch_is_added_to_angles_of_elastic_cables(tmp_path, with_tensions):
+    """Set points that are played perfectly, 40 ms late, are no error."""
+    robot = {"name": "e", "mass": 2.0, "base_points": [[0.9, -0.5, 0.0], [-0.9, -0.5, 0.0], [0.0, 1.0, 0.0]]}
+    robot |= {"axial_stiffness": 1e4, "winch": {"drum_radius": 0.02, "zero_length": 1.0}}
+    places = [([0.0, 0.0, 1.2], 0.0), ([0.1, 0.05, 1.1], 1.5), ([0.0, 0.1, 1.3], 3.0)]
+    plan = cspr_jax.plan(_spec(robot, places))
+    points = plan.setpoints(100.0)
+    tensions = plan.rows(100.0)["tension"] if with_tensions else None
+    log = _written(tmp_path / "log.csv", points.times + 0.04, points.angles, tensions, name="angle")
+    found = cspr_jax.compare_log(log, plan)
+    assert found.delay.value == pytest.approx(0.04, abs=1e-4)
+    inside = (found.times[found.rows] > 0.1) & (found.times[found.rows] < 2.9)
+    # Without the stretch, some 1.5 mm are missing.
+    assert np.abs(found.position_errors[inside]).max() < 3e-5
+    whose = "measured" if with_tensions else "planned"
+    assert f"to which {whose} tensions add the stretch" in " ".join(found.warnings)
+
+
 def test_angles_of_motors_are_logs(planned, tmp_path):
     spec, rows = planned
     winch = {"drum_radius": 0.02, "gear_ratio": 3.0, "zero_length": 1.0, "direction": [1, -1, 1]}

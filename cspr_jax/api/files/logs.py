@@ -160,8 +160,6 @@ def _compared(
     max_delay: float,
 ) -> LogComparison:
     times, warnings = np.asarray(read.times), [*planned.warnings, *read.notes]
-    if read.lengths is None and planned.problem.robot.axial_stiffness is not None:
-        warnings.append("cables are elastic: angles give their unstretched lengths, so that errors include the stretch")
     if not (-max_delay <= times[0] <= curves.duration + max_delay):
         warnings.append(f"times begin at {times[0]:.9g} s: counted from the first row")
         times = times - times[0]
@@ -169,6 +167,9 @@ def _compared(
     rows = np.flatnonzero(np.isfinite(lengths).all(1))
     largest = min(max_delay, curves.duration)
     delay = delay_of(times, lengths, curves.lengths, curves.rates, largest)
+    if read.lengths is None and planned.problem.robot.axial_stiffness is not None:
+        lengths = _stretched(lengths, planned, read, curves, times - np.nan_to_num(delay.value), warnings)
+        delay = delay_of(times, lengths, curves.lengths, curves.rates, largest)
     if delay.is_at_edge:
         farther = ": --max-delay looks farther" if max_delay < curves.duration else ", the plan's duration"
         warnings.append(f"the delay is at the end of what was looked for, {largest:g} s{farther}")
@@ -209,6 +210,24 @@ def _compared(
         tolerance=tolerance,
         warnings=tuple(warnings),
     )
+
+
+def _stretched(
+    lengths: np.ndarray,
+    planned: plans.Plan,
+    read: CableLog,
+    curves: PlanCurves,
+    times: np.ndarray,
+    warnings: list[str],
+) -> np.ndarray:
+    # Lengths of elastic cables: angles give the unstretched ones.
+    measured, tensions, _ = _slack(read, curves, planned.robot_file.pairs, times)
+    is_measured = measured is not None and measured.shape == tensions.shape
+    if measured is not None and is_measured:
+        tensions = np.where(np.isfinite(measured), np.maximum(measured, 0.0), tensions)
+    whose = "measured" if is_measured else "planned"
+    warnings.append(f"cables are elastic: angles give unstretched lengths, to which {whose} tensions add the stretch")
+    return lengths * (1.0 + tensions / np.asarray(planned.problem.robot.axial_stiffness))
 
 
 def _positive(path: Path, read: CableLog, lengths: np.ndarray, warnings: list[str]) -> np.ndarray:
