@@ -235,8 +235,8 @@ def test_stretch_is_added_to_angles_of_elastic_cables(tmp_path, with_tensions):
     places = [([0.0, 0.0, 1.2], 0.0), ([0.1, 0.05, 1.1], 1.5), ([0.0, 0.1, 1.3], 3.0)]
     plan = cspr_jax.plan(_spec(robot, places))
     points = plan.setpoints(100.0)
-    tensions = plan.rows(100.0)["tension"] if with_tensions else None
-    log = _written(tmp_path / "log.csv", points.times + 0.04, points.angles, tensions, name="angle")
+    tensions = points.tension if with_tensions else None
+    log = _written(tmp_path / "log.csv", points.t + 0.04, points.angle, tensions, name="angle")
     found = cspr_jax.compare_log(log, plan)
     assert found.delay.value == pytest.approx(0.04, abs=1e-4)
     inside = (found.times[found.rows] > 0.1) & (found.times[found.rows] < 2.9)
