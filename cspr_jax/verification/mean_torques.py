@@ -139,7 +139,9 @@ def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array
         tensions = witness_tensions(matrix * unit[:, None], wrench * unit, *tension_range(robot, limits))
         motors = motor_bounds(cast("Winches", robot.winches), cables)
         torque = torque_bounds(cast("Winches", robot.winches), motors, tensions.tension)
-        may_act = motors.may_act()
+        # A drum with layers has two more cases, copies of the first two where its radius is one.
+        is_copy = motors.has_one_radius[None] & (jnp.arange(len(motors.side)) >= 2)[:, None]
+        may_act = motors.may_act() & ~is_copy
         low, high = _squares(torque)
         one_case = _mean_square(torque)
         is_mixed = jnp.sum(may_act, axis=0) > 1

@@ -55,6 +55,19 @@ def test_root_mean_square(torques):
     assert _segment(motor_torque_rms_max=rms * (1.0 - BESIDE))[1]["verdict"] == "motor_over_torque_rms"
 
 
+def test_means_of_a_drum_with_one_layer_are_those_without_layers():
+    """All of the cable lies in the first layer, of the same radius; the bounds of both are equally close."""
+    layers = {"layer_turns": 100.0, "cable_length": 5.0}
+    robot = PLAN["robot"] | {"cable_diameter": 1e-3}
+    limits = {"motor_torque_rms_max": 1.05 * _segment(motor_torque_rms_max=1.0)[1]["motor_torque_rms_max"]}
+    plans = [
+        cspr_jax.plan(PLAN | {"limits": limits, "robot": robot | {"winch": WINCH | more}}) for more in ({}, layers)
+    ]
+    plain, layered = (mean_torques(plan.problem, [leg.motions[0] for leg in plan.legs]) for plan in plans)
+    np.testing.assert_allclose(layered.rms_low, plain.rms_low, rtol=1e-9)
+    np.testing.assert_allclose(layered.rms_high, plain.rms_high, rtol=1e-9)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("limits", [{"motor_torque_max": 0.013}, {"motor_torque_rms_max": 0.0084}])
 def test_cells_of_maps_equal_plans(limits):

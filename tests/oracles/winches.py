@@ -103,11 +103,21 @@ class Motors:
         return answer.fun if answer.status == 0 else np.inf
 
 
+def turning_times(motors, times, parts=40):
+    """Times between samples in which a cable turns, where a drum with layers may enter another one and leave it."""
+    if motors.winch.get("growth") is None:
+        return times[:0]
+    rates = any_motion.cables(motors.robot, motors.motion.state(times)).rates
+    first = np.flatnonzero((rates[1:] * rates[:-1] <= 0.0).any(1))
+    return np.linspace(times[first], times[first + 1], parts).ravel()
+
+
 def largest_need(motors, name, samples=4001, rounds=5, parts=20):
     """Largest need over a motion, and its time: samples, and finer ones about the highest of them."""
     times = np.linspace(*motors.motion.times, samples)
-    values = motors.needs(name, times)
     width = times[1] - times[0]
+    times = np.union1d(times, turning_times(motors, times))
+    values = motors.needs(name, times)
     at = times[np.argsort(values)[-3:]]
     best = values.max()
     for _ in range(rounds):
