@@ -18,7 +18,6 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.families.paths.least_time.constraints import HalfPlanes
-from cspr_jax.numerics.elementary import maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -99,11 +98,11 @@ def _bounds_of(u: Array, x_coefficient: Array, bound: Array) -> _Bounds:
 def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
     # Return h at x, its derivative, and its rounding error; use reductions alone, since searches for indices are slow.
     upper, lower = bounds.upper - bounds.rate * x[None], bounds.lower - bounds.rate * x[None]
-    beta, alpha = minimum_of(upper, axis=0), maximum_of(lower, axis=0)
-    falls = maximum_of(jnp.where(upper <= beta[None], bounds.rate, -jnp.inf), axis=0)
-    rises = minimum_of(jnp.where(lower >= alpha[None], bounds.rate, jnp.inf), axis=0)
+    beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
+    falls = jnp.max(jnp.where(upper <= beta[None], bounds.rate, -jnp.inf), axis=0)
+    rises = jnp.min(jnp.where(lower >= alpha[None], bounds.rate, jnp.inf), axis=0)
     magnitude = jnp.abs(bounds.rate * x[None]) + bounds.magnitude
-    largest = maximum_of(jnp.where((upper <= beta[None]) | (lower >= alpha[None]), magnitude, 0.0), axis=0)
+    largest = jnp.max(jnp.where((upper <= beta[None]) | (lower >= alpha[None]), magnitude, 0.0), axis=0)
     return beta - alpha, rises - falls, CLOSE * largest
 
 
@@ -133,8 +132,8 @@ def _flat_range(u: Array, x_coefficient: Array, bound: Array, cap: Array) -> tup
     # none is possible.
     is_flat = jnp.abs(u) <= FLAT
     over = jnp.where(jnp.abs(x_coefficient) > FLAT, x_coefficient, 1.0)
-    high = minimum_of(jnp.where(is_flat & (x_coefficient > FLAT), bound / over, jnp.inf), axis=0)
-    low = maximum_of(jnp.where(is_flat & (x_coefficient < -FLAT), bound / over, 0.0), axis=0)
+    high = jnp.min(jnp.where(is_flat & (x_coefficient > FLAT), bound / over, jnp.inf), axis=0)
+    low = jnp.max(jnp.where(is_flat & (x_coefficient < -FLAT), bound / over, 0.0), axis=0)
     never = (is_flat & (jnp.abs(x_coefficient) <= FLAT) & (bound < 0.0)).any(0)
     return jnp.maximum(low, 0.0), jnp.where(never, -1.0, jnp.minimum(high, cap))
 
@@ -184,7 +183,7 @@ def fastest(
     def ahead(x: Array, step):
         cell, low, high = step
         bounds = _bounds_of(*half_planes_of(cell, low, high))
-        after = jnp.clip(x + 2.0 * cell.width * minimum_of(bounds.upper - bounds.rate * x[None], axis=0), low, high)
+        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.rate * x[None], axis=0), low, high)
         return after, (after, 0.5 * (after - x) / cell.width)
 
     beginning = jnp.clip(start, low[0], high[0])
