@@ -43,7 +43,8 @@ def without_cables(robot_file: RobotFile, cables: Sequence[int] | str | None, fi
             file,
             f"{text}: {too_few(robot_file, len(remaining))}: must leave at least {row.dof} cables ({row.description})",
         )
-    spec = robot_file.model_dump(exclude_none=True)
+    # Parameters move numbers of the full robot: they are set before cables go.
+    spec = robot_file.model_dump(exclude_none=True, exclude={"parameter"})
     spec |= {name: [value[i] for i in remaining] for name, value in spec.items() if _is_per_cable(name, value)}
     if robot_file.winch is not None:
         spec["winch"] = robot_file.winch.of_cables(remaining).model_dump(exclude_none=True)

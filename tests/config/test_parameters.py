@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from support.commands import cspr, strict_json
 
 import cspr_jax
+from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import ConfigError, InputError
@@ -301,3 +302,13 @@ def test_wrong_axes_are_refused_in_one_line(folder, old, new, line):
     code, out, error = cspr("run", "sweep.toml", "-o", "out")
     assert code == 2 and error.startswith(f"cspr: sweep.toml: {line}"), error
     assert error.count("\n") == 1 and not out and not (folder / "out").exists()
+
+
+def test_cables_go_after_parameters_are_set():
+    square = {"base_points": [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], "mass": 1.0, "name": "square"}
+    moves = {"base_points[3][0]": 1.0, "base_points[1][1]": 0.5}
+    square |= {"parameter": [{"name": "lean", "value": 0, "lower": -0.5, "upper": 0.5, "moves": moves}]}
+    robot = checked(RobotFile, square, "square").with_parameters({"lean": 0.4})
+    left = without_cables(robot, [0], "square")
+    np.testing.assert_allclose(left.base_points, [[-1, 1.2, 0], [-1, -1, 0], [1.4, -1, 0]])
+    assert left.full is robot
