@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from support.commands import cspr, strict_json
 
 import cspr_jax
+from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile, read_robot
@@ -312,3 +313,9 @@ def test_cables_go_after_parameters_are_set():
     left = without_cables(robot, [0], "square")
     np.testing.assert_allclose(left.base_points, [[-1, 1.2, 0], [-1, -1, 0], [1.4, -1, 0]])
     assert left.full is robot
+
+
+def test_parameters_are_written_as_they_are_read():
+    robot = checked(RobotFile, tomllib.loads(ROBOT + PARAMETERS), "robot.toml").with_parameters({"size": 1.2})
+    spec = robot.model_dump(mode="json", exclude_none=True)
+    assert checked(RobotFile, tomllib.loads(robot_text(spec)), "written").model_dump() == robot.model_dump()

@@ -2,10 +2,13 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cspr_jax.errors import printable
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
@@ -19,7 +22,7 @@ def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
 def value_text(value: Any) -> str:
     """A value as TOML text."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {value_text(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key_text(key)} = {value_text(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list) and value and isinstance(value[0], list):
         return "[\n" + "".join(f"    {value_text(row)},\n" for row in value) + "]"
     if isinstance(value, list):
@@ -29,3 +32,7 @@ def value_text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return "inf" if math.isinf(value) else repr(value)
+
+
+def _key_text(key: str) -> str:
+    return key if _BARE.fullmatch(key) else value_text(key)
