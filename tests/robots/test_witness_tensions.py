@@ -124,7 +124,7 @@ def test_margins_of_tensions_against_highs(name, high, parabolas):
             allowance = 1e-6 * (1.0 + np.abs(wrenches[i]).max())
             assert min(exact) >= tensions.margin_low[i] - allowance
             assert max(exact) <= tensions.margin_high[i] + allowance
-            proved += tensions.margin_low[i] > 0.0 or tensions.margin_high[i] < 0.0
+            proved += bool(tensions.margin_low[i] > 0.0 or tensions.margin_high[i] < 0.0)
     # Most blocks are decided at once.
     assert proved >= 14
 
