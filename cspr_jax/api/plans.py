@@ -11,7 +11,7 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed, plan_summary
-from cspr_jax.config.keys.parameter import with_values
+from cspr_jax.config.parameters import with_values
 from cspr_jax.config.plan import checked_plan
 from cspr_jax.config.reading import json_text, plain_values, read_toml
 from cspr_jax.errors import ConfigError, InputError

@@ -23,6 +23,7 @@ from cspr_jax.errors.arguments import Cables, Integer, Times
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.machine.stops.candidates import ProvedStop
 from cspr_jax.machine.stops.fastest import ConsecutiveMotions, Emergency, fastest_stops
+from cspr_jax.motion.given_limits import check_no_means
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
@@ -111,10 +112,8 @@ def _check(planned: Plan) -> None:
         raise ConfigError(NAME, "its motion is too long to be held: must be a shorter one")
     if planned.problem.limits.uncertainty is not None:
         raise ConfigError(NAME, "uncertainty: must be absent in a plan that is to be stopped: stops are proved without")
-    if (largest := planned.problem.limits.motor_torque_rms_max) is not None:
-        allowed = "absent, in [winch] of the robot too: it bounds a mean over a full plan, which a stop is not"
-        values = np.unique(np.asarray(largest)).tolist()
-        raise InputError(f"{NAME}: motor_torque_rms_max", values if len(values) > 1 else values[0], allowed)
+    allowed = "absent, in [winch] of the robot too: it bounds a mean over a full plan, which a stop is not"
+    check_no_means(planned.problem.limits, f"{NAME}: ", allowed)
     if any(feeds is not None for feeds in planned.feeds):
         raise ConfigError(NAME, "feeds: must be absent in a plan that is to be stopped: stops are proved without")
 

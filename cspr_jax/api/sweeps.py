@@ -16,7 +16,7 @@ import numpy as np
 
 from cspr_jax.api.arguments.checks import ResultOrPath, checked
 from cspr_jax.api.notebooks import Displayed
-from cspr_jax.config.keys.parameter import with_values
+from cspr_jax.config.parameters import with_values
 from cspr_jax.config.reading import json_text, plain_values
 from cspr_jax.errors import ConfigError
 from cspr_jax.errors.arguments import AnyInteger, File, Parameters, PathNames, TileRange

@@ -1,5 +1,7 @@
 """Robots and limits for the kernels, built from checked files."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any, Literal, overload
 

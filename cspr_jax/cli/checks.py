@@ -77,7 +77,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 def _spec(options: argparse.Namespace) -> dict[str, Any]:
     from cspr_jax.config.keys.limits import LimitTable
     from cspr_jax.config.keys.obstacles import ObstacleKeys
-    from cspr_jax.config.keys.parameter import with_values
+    from cspr_jax.config.parameters import with_values
     from cspr_jax.config.reading import checked, read_toml
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):

@@ -21,8 +21,9 @@ from cspr_jax.config.keys.limits import (
     Point,
     Positive,
 )
-from cspr_jax.config.keys.parameter import MAX_PARAMETERS, ParameterTable, check_bounds, check_parameters, moved
+from cspr_jax.config.keys.parameter import MAX_PARAMETERS, ParameterTable
 from cspr_jax.config.keys.winch import WinchTable
+from cspr_jax.config.parameters import check_bounds, check_parameters, moved
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, demand, shown
@@ -289,11 +290,10 @@ class RobotFile(LimitKeys):
 
     @model_validator(mode="after")
     def _have_robots(self) -> "RobotFile":
-        if not self.parameter:
-            return self
-        spec = self.model_dump(exclude_none=True, exclude={"parameter"})
-        check_parameters(self.parameter, spec)
-        check_bounds(self.parameter, spec, _of_numbers)
+        if self.parameter:
+            spec = self.model_dump(exclude_none=True, exclude={"parameter"})
+            check_parameters(self.parameter, spec)
+            check_bounds(self.parameter, spec, _of_numbers)
         return self
 
     def with_parameters(self, values: Mapping[str, float]) -> "RobotFile":

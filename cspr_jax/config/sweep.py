@@ -29,7 +29,7 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, name_of
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import PARAMETER, QUANTITIES
+from cspr_jax.schema.quantities import PARAMETER, PARAMETER_NAME, QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
@@ -107,7 +107,7 @@ class Axes(Table):
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
     from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
-    parameter: dict[str, Axis] | None = Field(
+    parameter: dict[Annotated[str, Field(pattern=f"^{PARAMETER_NAME}$")], Axis] | None = Field(
         None,
         description='"parameter.NAME": values of a parameter of the robot file, so that cells are of different robots',
     )

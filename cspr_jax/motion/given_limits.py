@@ -106,7 +106,9 @@ def check_no_motors(limits: Limits, at: str = "") -> None:
 
 
 def _shown(value: Any) -> Any:
-    return np.unique(np.asarray(value)).tolist()
+    # One number where all cables have the same.
+    values = np.unique(np.asarray(value)).tolist()
+    return values if len(values) > 1 else values[0]
 
 
 def _of_line(name: str, value: Any) -> str:
@@ -114,11 +116,12 @@ def _of_line(name: str, value: Any) -> str:
     return f"; it follows from winch.{LINE}" if name == LOAD and (np.asarray(value) == 1.0).all() else ""
 
 
-def check_no_means(limits: Limits, at: str = "") -> None:
+def check_no_means(
+    limits: Limits, at: str = "", allowed: str = "absent: only plans, checks, and maps of arcs take it"
+) -> None:
     """Refuse limits of full motions where single motions are parts of no plan."""
     if limits.motor_torque_rms_max is not None:
-        value = np.unique(np.asarray(limits.motor_torque_rms_max)).tolist()
-        raise InputError(f"{at}motor_torque_rms_max", value, "absent: only plans, checks, and maps of arcs take it")
+        raise InputError(f"{at}motor_torque_rms_max", _shown(limits.motor_torque_rms_max), allowed)
 
 
 def _refuse_of_motion(robot: Any, limits: Limits, accelerates: bool, moves: bool) -> None:

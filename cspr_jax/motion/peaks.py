@@ -33,7 +33,7 @@ BATCH = 512  # number of samples computed at a time
 MAX_SAMPLES = 200_000
 TINY = 1e-300
 # A rate below this fraction of the next sample's is a standstill.
-STANDSTILL = 1e-9
+ZERO_RATE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _root_mean_squares(
     width, squares, speeds = np.diff(tau)[..., None], torques**2, np.abs(rates)
     earlier, later = speeds[:, :-1], speeds[:, 1:]
     both = earlier + later
-    jumps = (rates[:, :-1] * rates[:, 1:] <= STANDSTILL * both**2) & (both > 0.0)
+    jumps = (rates[:, :-1] * rates[:, 1:] <= ZERO_RATE * both**2) & (both > 0.0)
     fraction = np.where(jumps, earlier / np.where(jumps, both, 1.0), 0.5)
     integrals = np.sum(width * (fraction * squares[:, :-1] + (1.0 - fraction) * squares[:, 1:]), axis=1)
     return np.sqrt((integrals / np.maximum(np.sum(width, axis=1), TINY)).max(1))

@@ -13,7 +13,7 @@ from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import PARAMETER
+from cspr_jax.schema.quantities import parameter_values
 
 # Quantities that fix the number of arcs, and how many arcs one unit of each is.
 COUNTS = {"arcs": 1, "tried_arcs": 1, "oscillations": 2, "tried_oscillations": 2}
@@ -34,8 +34,7 @@ def cell_plan(
     for key in ("limits", "without"):
         if settings.get(key):
             trajectory_keys[key] = settings[key]
-    parameters = {name.removeprefix(PARAMETER): cell[name] for name in cell if name.startswith(PARAMETER)}
-    if parameters:
+    if parameters := parameter_values(cell):
         trajectory_keys["parameters"] = parameters
     if trajectory.get("family") == "path":
         return _path(settings, cell, {"samples": samples, **trajectory_keys})

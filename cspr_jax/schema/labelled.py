@@ -1,6 +1,5 @@
 """Arrays by name of their quantities, as datasets of xarray with units and long names."""
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ import numpy as np
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.quantities import ACROSS, OTHER_DIMS, PARTS, SEGMENTS, flag_attributes, parameter_units
+from cspr_jax.schema.quantities import ACROSS, OTHER_DIMS, PARTS, SEGMENTS, flag_attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -100,9 +99,8 @@ def axes_of(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray],
 
 def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     try:
-        quantity = quantity_of((settings or {}).get("map"), name)
+        quantity = quantity_of((settings or {}).get("map"), name, settings)
     except KeyError:
         return {}
-    quantity = dataclasses.replace(quantity, units=parameter_units(settings or {}).get(name, quantity.units))
     attributes = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
     return attributes | (flag_attributes() if name.endswith("verdict") else value_attributes(quantity, settings))

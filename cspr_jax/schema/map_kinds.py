@@ -9,7 +9,7 @@ scheduler, get the row with the sweep and import the class by its name, "module:
 import contextlib
 import dataclasses
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 from cspr_jax.errors import InputError
@@ -409,10 +409,10 @@ MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
 )
 
 
-def quantity_of(kind: object, name: str) -> Quantity:
-    """The row of a quantity, with the description of a kind of map if it has one."""
+def quantity_of(kind: object, name: str, settings: Mapping[str, Any] | None = None) -> Quantity:
+    """The row of a quantity, with the description of a kind of map if it has one; see `row_of` for settings."""
     forms = MAP_KINDS[kind].forms if isinstance(kind, str) and kind in MAP_KINDS else ()
-    return next((row for form in forms for row in form.rows if row.name == name), None) or row_of(name)
+    return next((row for form in forms for row in form.rows if row.name == name), None) or row_of(name, settings)
 
 
 def register(kind: MapKind, *quantities: Quantity) -> None:

@@ -1,6 +1,7 @@
 """Table of all quantities that result files can contain, with names, units, labels and descriptions."""
 
 import dataclasses
+import re
 from collections import ChainMap
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -109,8 +110,9 @@ AXES = {
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 # Axes without a best point: a motion passes all times, and a robot has all cables.
 _NO_CHOICES = ("tau", "cable")
-# Beginning of the names of axes that are parameters of the robot.
+# Beginning of the names of axes that are parameters of the robot, and what the names of parameters are.
 PARAMETER = "parameter."
+PARAMETER_NAME = r"[A-Za-z][A-Za-z0-9_-]{0,49}"
 
 
 def best_name(axis: str) -> str:
@@ -1011,27 +1013,32 @@ _OWN = frozenset(QUANTITIES)
 
 def is_axis(name: object) -> bool:
     """Tell whether a name is that of an axis of maps."""
-    return isinstance(name, str) and (name in AXES or (name.startswith(PARAMETER) and name != PARAMETER))
+    return isinstance(name, str) and (name in AXES or is_parameter(name))
 
 
-def row_of(name: str) -> Quantity:
-    """The row of a quantity or an axis, also of a parameter of the robot, or of its best value."""
+def is_parameter(name: object) -> bool:
+    """Tell whether a name is that of an axis of maps that is a parameter of the robot."""
+    return isinstance(name, str) and re.fullmatch(re.escape(PARAMETER) + PARAMETER_NAME, name) is not None
+
+
+def parameter_values(coordinates: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the robot's parameters, by their names, among the coordinates of a cell."""
+    return {name.removeprefix(PARAMETER): float(coordinates[name]) for name in coordinates if is_parameter(name)}
+
+
+def row_of(name: str, settings: Mapping[str, Any] | None = None) -> Quantity:
+    """The row of a quantity or an axis; parameters, and their best values, have units in the settings of a sweep."""
     if name in EVERY:
         return EVERY[name]
     best, _, parameter = name.rpartition(PARAMETER)
+    tables = (settings or {}).get("robot", {}).get("parameter") or ()
+    unit = next((table["unit"] for table in tables if table["name"] == parameter), "1")
     if best == best_name(""):
         words = f"With `--best {PARAMETER}{parameter}`: the best value; NaN where no value is feasible."
-        return Quantity(name, "1", f"best {parameter}", words)
+        return Quantity(name, unit, f"best {parameter}", words)
     if best:
         raise KeyError(name)
-    return Quantity(name, "1", parameter, f"Value of the parameter {parameter} of the robot file.")
-
-
-def parameter_units(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Units of the axes that are parameters, and of their best values, from the settings of a sweep."""
-    units = {table["name"]: table["unit"] for table in settings.get("robot", {}).get("parameter") or ()}
-    names = {f"{PARAMETER}{name}": unit for name, unit in units.items()}
-    return names | {best_name(name): unit for name, unit in names.items()}
+    return Quantity(name, unit, parameter, f"Value of the parameter {parameter} of the robot file.")
 
 
 def columns_of(name: str, count: int) -> list[str]:

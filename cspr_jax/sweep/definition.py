@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from cspr_jax import __version__
-from cspr_jax.config.keys.parameter import with_values
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.missing_cables import without_cables
+from cspr_jax.config.parameters import with_values
 from cspr_jax.config.reading import checked, parse_toml, read_text, refuse_other_kinds
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_names, axis_points

@@ -12,10 +12,11 @@ from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
+from cspr_jax.schema.quantities import is_parameter
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
-from cspr_jax.sweep.robots import CellsOfRobots, parameter_axes, robot_at
+from cspr_jax.sweep.robots import parameter_axes, robot_at, robots_of
 from cspr_jax.sweep.work import Computed
 
 # Margins this close to zero may have another sign on another processor; results contain the number of such cells.
@@ -33,16 +34,17 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            self._cells: GridMap | CellsOfRobots = _map_of(sweep)
-            if isinstance(self._cells, GridMap):
-                self._cells.refuse_hopeless(sweep.grid)
+            # Where axes are parameters, each robot of a tile has a map of its own.
+            self._one = None if parameter_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
+            if self._one is not None:
+                self._one.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:
         """Compute a tile."""
         tiling = self._sweep.grid.tiling
         try:
             with double_precision():
-                answers = self._cells(self._sweep.grid.cells(tiling.slices(index)))
+                answers, undecided = self._answers(index, self._sweep.grid.cells(tiling.slices(index)))
         except (MemoryError, jax.errors.JaxRuntimeError) as error:
             if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):
                 raise ResourceError(
@@ -50,25 +52,28 @@ class TileMap:
                     "must be smaller"
                 ) from error
             raise
-        _refuse(index, self._cells.contradictions(answers))
         # Counts and flags fit into their small types, since max_arcs is at most 1000.
         values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
         this_environment = environment()
-        undecided = self._cells.undecided(answers)
         return Computed(
             Shard(index, digest(this_environment), _near_zero(answers), values, undecided), this_environment
         )
 
+    def _answers(self, index: int, cells: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int | None]:
+        # Answers of the cells of a tile, robot by robot, and the number of them that are undecided.
+        sweep, others = self._sweep, {name: points for name, points in cells.items() if not is_parameter(name)}
+        parts, order = [], []
+        for values, indices in robots_of(cells):
+            one = self._one or _map_of(sweep, robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file))
+            parts.append(one({name: points[indices] for name, points in others.items()}))
+            order.append(indices)
+            _refuse(index, one.contradictions(parts[-1]))
+        back = np.argsort(np.concatenate(order))
+        answers = {name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]}
+        return answers, one.undecided(answers)
 
-def _map_of(sweep: Sweep) -> GridMap | CellsOfRobots:
-    if not parameter_axes(sweep.grid.axes):
-        return _map_of_robot(sweep, sweep.robot)
-    return CellsOfRobots(
-        lambda values: _map_of_robot(sweep, robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file))
-    )
 
-
-def _map_of_robot(sweep: Sweep, robot_file: RobotFile) -> GridMap:
+def _map_of(sweep: Sweep, robot_file: RobotFile) -> GridMap:
     make = sweep.kind.load()
     if sweep.spec.without != ANY_ONE:
         return make(robot_file, sweep.spec, sweep.file)

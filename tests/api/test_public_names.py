@@ -98,6 +98,9 @@ def test_every_command_has_its_function():
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         own |= {"output": "path"} if name == "calibrate" else {}
         own |= {"file": "lengths", "all": "all_solutions", "slack": "equilibrium"} if name == "locate" else {}
+        # `load_robot` takes parameters of the robot that is checked, `plan` those of what is played, driven or stopped.
+        own |= {"parameters": "robot"} if name == "check" else {}
+        known |= {"parameters"} if name in ("replay", "simulate", "stops") else set()
         known |= {"slower"} if name == "check" else set()  # a method of what is checked
         known |= {"output"} if name == "locate" else set()  # a table of the answers
         known |= {"retime"} if name in ("plan", "check") else set()  # a function of what is planned or checked

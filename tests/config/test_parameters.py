@@ -48,13 +48,6 @@ lower = 0.5
 upper = 3
 moves = { scale = 1, "parameter.load" = 0.1, "winch.drum_radius" = 0.01, "winch.motor_torque_max[1]" = -0.1 }
 """
-PLAN = {
-    "schema": 1,
-    "robot": "robot.toml",
-    "family": "hypocycloid-standard",
-    "z0": 1.4,
-    "pose": [{"rest": True}, {"position": [0.8, 0.2, 1.3]}],
-}
 PLAN_TEXT = """schema = 1
 robot = "robot.toml"
 family = "hypocycloid-standard"
@@ -64,6 +57,7 @@ rest = true
 [[pose]]
 position = [0.8, 0.2, 1.3]
 """
+PLAN = tomllib.loads(PLAN_TEXT)
 SWEEP = """schema = 1
 map = "minimum-arcs"
 robot = "robot.toml"

@@ -1,7 +1,6 @@
 """HDF5 in netCDF-4 layout: named axes with units, checksums on data and metadata."""
 
 import contextlib
-import dataclasses
 import os
 import stat
 from collections.abc import Iterator, Mapping
@@ -13,7 +12,7 @@ import numpy as np
 
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.quantities import QUANTITIES, Quantity, flag_attributes, parameter_units, row_of
+from cspr_jax.schema.quantities import QUANTITIES, Quantity, flag_attributes, row_of
 from cspr_jax.store.files.checksum import write_trailer
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import new_file
@@ -60,8 +59,7 @@ def make_datasets(
     """The empty datasets of a result over a grid, with their axes."""
     for name, points in axes.items():
         scale = file.create_dataset(name, data=points, track_times=False)
-        row = row_of(name)
-        describe(scale, dataclasses.replace(row, units=parameter_units(settings or {}).get(name, row.units)))
+        describe(scale, row_of(name, settings))
         scale.make_scale(name)
     shape = tuple(len(points) for points in axes.values())
     for name in store:

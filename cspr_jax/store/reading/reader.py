@@ -21,12 +21,12 @@ from cspr_jax.schema.quantities import (
     AXES,
     FAILURES,
     FLIGHT,
-    PARAMETER,
     PATHS,
     QUANTITIES,
     SEGMENTS,
     TRAJECTORY,
     Quantity,
+    is_parameter,
     register,
 )
 from cspr_jax.store.consolidation import content_of
@@ -128,8 +128,7 @@ def _parameters(attributes: dict[str, Any]) -> list[str]:
         order = plain_json(str(attributes.get("settings"))).get("dimensions", ())
     except (DamagedError, AttributeError):
         return []
-    names = [name for name in order if isinstance(name, str) and name.startswith(PARAMETER)]
-    return names[: guard.LARGEST_RANK]
+    return [name for name in order if is_parameter(name)][: guard.LARGEST_RANK] if isinstance(order, list) else []
 
 
 def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:

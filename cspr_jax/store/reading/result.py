@@ -24,7 +24,6 @@ from cspr_jax.schema.quantities import (
     SEGMENTS,
     TRAJECTORY,
     is_axis,
-    parameter_units,
 )
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.files.checksum import DamagedError
@@ -165,11 +164,8 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[st
 
 def _described(settings: Mapping[str, Any], names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
     # Units and long names, from the rows of the kind of map, and of parameters from the robot.
-    quantities = {name: quantity_of(settings.get("map"), name) for name in names}
-    units = parameter_units(settings)
-    return {name: units.get(name, quantity.units) for name, quantity in quantities.items()}, {
-        name: quantity.long_name for name, quantity in quantities.items()
-    }
+    quantities = [quantity_of(settings.get("map"), name, settings) for name in names]
+    return {row.name: row.units for row in quantities}, {row.name: row.long_name for row in quantities}
 
 
 def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
-from cspr_jax.schema.quantities import PARAMETER
+from cspr_jax.schema.quantities import is_parameter, parameter_values
 from cspr_jax.store.reading.result import Result
 
 ON_ARC = 9  # number of points through which an arc is drawn, including its ends
@@ -43,16 +43,14 @@ class Posed(NamedTuple):
 
 def robot_of(result: Result, coordinates: Mapping[str, float] | None = None) -> RobotFile:
     """The robot of a map, in a cell where axes are parameters; those without a coordinate are as in the robot file."""
-    cell = coordinates or {}
-    values = {name.removeprefix(PARAMETER): cell[name] for name in cell if name.startswith(PARAMETER)}
-    robot_file = RobotFile(**result.settings["robot"]).with_parameters(values)
+    robot_file = RobotFile(**result.settings["robot"]).with_parameters(parameter_values(coordinates or {}))
     return without_cables(robot_file, result.settings.get("without"), "result")
 
 
 def spools_of(result: Result, coordinates: Mapping[str, float]) -> Float[np.ndarray, "n 3"] | None:
     """Spools of the robot in a cell; None where they depend on parameters that have no coordinate."""
     axes = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
-    names = [name for name in axes if name.startswith(PARAMETER)]
+    names = [name for name in axes if is_parameter(name)]
     if not names:
         return np.asarray(result.attributes["base_points"], float) if "base_points" in result.attributes else None
     fixed = {name: value for name, value in coordinates.items() if name not in result.choices}

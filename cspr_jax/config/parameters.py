@@ -1,0 +1,178 @@
+"""Parameters of robot files: named numbers that move others by multiples of their change; without jax."""
+
+import copy
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.keys.parameter import ParameterTable
+from cspr_jax.config.wording import table_error
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors.suggestions import did_you_mean
+from cspr_jax.schema.quantities import PARAMETER
+
+# Fraction of the bounds by which rounding may put a value beyond them.
+ROUNDING = 1e-12
+# Factors of points about their centroid and about the origin of the platform's axes; 1 in a file.
+SCALES = {"scale": "base_points", "platform_scale": "platform_points"}
+_PART = re.compile(r"[^.\[\]]+|\[[0-9]+\]")
+
+
+def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, Any]) -> None:
+    """Refuse parameters of one name, that move what is no number of the file, or that move themselves."""
+    names = [parameter.name for parameter in parameters]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise table_error(f"parameter[{i}].name", name, "a name that no other parameter has")
+    numbers = [*dict(_numbers(spec)), *(key for key, points in SCALES.items() if spec.get(points) is not None)]
+    targets = {*numbers, *(PARAMETER + name for name in names)}
+    for i, parameter in enumerate(parameters):
+        for target in parameter.moves:
+            if target not in targets:
+                hint = did_you_mean(target, sorted(targets))
+                allowed = f"{hint}numbers of the file, such as {', '.join(numbers[:2])}, or parameter.NAME"
+                raise table_error(f"parameter[{i}].moves", shown(target), allowed)
+    for i, name in enumerate(names):
+        if (cycle := _cycle(parameters, name)) is not None:
+            text = " -> ".join(cycle)
+            raise table_error(f"parameter[{i}].moves", text, "parameters that do not move themselves")
+
+
+def check_bounds(
+    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], check: Callable[[dict[str, Any]], object]
+) -> None:
+    """Refuse parameters one of whose bounds alone moves the numbers of a file so that a check refuses them."""
+    for i, parameter in enumerate(parameters):
+        for bound in ("lower", "upper"):
+            value = getattr(parameter, bound)
+            try:
+                check(_moved(spec, _changes(parameters, {parameter.name: value})))
+            except (ConfigError, InputError) as error:
+                allowed = f"a value that gives a robot ({error})"
+                raise table_error(f"parameter[{i}].{bound}", value, allowed) from error
+
+
+def moved(
+    parameters: Sequence[ParameterTable], spec: Mapping[str, Any], values: Mapping[str, float]
+) -> tuple[dict[str, Any], list[ParameterTable]] | None:
+    """The numbers of a file at other values of its parameters, and its parameters there; None if nothing changes.
+
+    Raises:
+        InputError: no parameter has this name, a value is beyond its bounds, or a scale is not positive.
+    """
+    changes = _changes(parameters, values)
+    if not any(changes.values()):
+        return None
+    return _moved(spec, changes), [_moved_parameter(table, spec, changes) for table in parameters]
+
+
+def _changes(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -> dict[str, float]:
+    # Changes of numbers of the file, and of values of parameters, by their keys.
+    tables = {parameter.name: parameter for parameter in parameters}
+    changes: dict[str, float] = {}
+
+    def move(key: str, change: float) -> None:
+        changes[key] = changes.get(key, 0.0) + change
+        if key.startswith(PARAMETER):
+            for target, multiple in tables[key.removeprefix(PARAMETER)].moves.items():
+                move(target, multiple * change)
+
+    for name, value in values.items():
+        if name not in tables:
+            hint = did_you_mean(name, tables)
+            allowed = f"{hint}one of {', '.join(tables)}" if tables else "absent: the robot file has no [[parameter]]"
+            raise InputError(f"parameters.{name}", value, allowed)
+        move(PARAMETER + name, value - tables[name].value)
+    for name, table in tables.items():
+        value = table.value + changes.get(PARAMETER + name, 0.0)
+        slack = ROUNDING * max(abs(table.lower), abs(table.upper))
+        if not table.lower - slack <= value <= table.upper + slack:
+            allowed = f"from {shown(table.lower)} to {shown(table.upper)}, as [[parameter]] of the robot file says"
+            raise InputError(f"parameters.{name}", value, allowed)
+    return changes
+
+
+def _moved(spec: Mapping[str, Any], changes: Mapping[str, float]) -> dict[str, Any]:
+    result = copy.deepcopy(dict(spec))
+    for key, change in changes.items():
+        if key.startswith(PARAMETER):
+            continue
+        if key in SCALES and not 1.0 + change > 0.0:
+            raise InputError(key, 1.0 + change, "a number > 0")
+        for number, multiple in _numbers_of(key, spec):
+            *parents, last = (_index(part) for part in _PART.findall(number))
+            table: Any = result
+            for part in parents:
+                table = table[part]
+            table[last] += multiple * change
+    return result
+
+
+def _moved_parameter(
+    parameter: ParameterTable, spec: Mapping[str, Any], changes: Mapping[str, float]
+) -> ParameterTable:
+    # Numbers still move by the same multiples, so that scales, which depend on where points are, become numbers.
+    moves: dict[str, float] = {}
+    for key, multiple in parameter.moves.items():
+        for number, factor in _numbers_of(key, spec):
+            moves[number] = moves.get(number, 0.0) + factor * multiple
+    value = parameter.value + changes.get(PARAMETER + parameter.name, 0.0)
+    inside = min(max(value, parameter.lower), parameter.upper)
+    return parameter.model_copy(update={"value": inside, "moves": moves})
+
+
+def _numbers_of(target: str, spec: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    # Numbers that a target stands for, with factors: a scale moves points away from their center.
+    if target not in SCALES:
+        yield target, 1.0
+        return
+    points = np.asarray(spec[SCALES[target]], float)
+    arms = points - points.mean(0) if target == "scale" else points
+    for (i, j), arm in np.ndenumerate(arms):
+        if arm != 0.0:
+            yield f"{SCALES[target]}[{i}][{j}]", float(arm)
+
+
+def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dict[str, Any]:
+    """A parsed plan or sweep with more values of parameters, which replace its own."""
+    if not values:
+        return spec
+    earlier = spec.get("parameters", {})
+    return spec | {"parameters": {**(earlier if isinstance(earlier, Mapping) else {}), **values}}
+
+
+def _numbers(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    # All numbers of a parsed file, by their keys.
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _numbers(inner, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for i, inner in enumerate(value):
+            yield from _numbers(inner, f"{key}[{i}]")
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, value
+
+
+def _index(part: str) -> str | int:
+    return int(part[1:-1]) if part.startswith("[") else part
+
+
+def _cycle(parameters: Sequence[ParameterTable], first: str) -> list[str] | None:
+    # Names from a parameter back to itself; None if there is no such way.
+    moves = {
+        parameter.name: [key.removeprefix(PARAMETER) for key in parameter.moves if key.startswith(PARAMETER)]
+        for parameter in parameters
+    }
+    paths = [[first]]
+    seen: set[str] = set()
+    while paths:
+        path = paths.pop()
+        for name in moves[path[-1]]:
+            if name == first:
+                return [*path, name]
+            if name not in seen:
+                seen.add(name)
+                paths.append([*path, name])
+    return None
