@@ -23,7 +23,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 shapes.install()
 
-from cspr_jax.numerics import batches, elementary
+from cspr_jax.numerics import batches, elementary, kept_nan
 from cspr_jax.robots.model import point_mass
 from cspr_jax.runtime import xla
 
@@ -85,6 +85,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     """Before jax compiles anything. The soak takes batches and flags of users."""
+    kept_nan.set_flag()
     if "not soak" in config.option.markexpr:
         # Workers find them set already. Twice, they would be other keys of compiled code than those of one process.
         given = os.environ.get("XLA_FLAGS", "").split()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import os
+import warnings
 from collections.abc import Iterator
 from typing import Any, cast
 
@@ -13,11 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from cspr_jax.numerics import kept_nan
 from cspr_jax.numerics.shapes import Float
 
 # Numbers of terms that keep the truncation error below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
 _COSINE_TERMS = {"float64": 12, "float32": 7}
+# Number of values from which all versions of XLA that leave NaN out of minima do.
+_MANY = 100_000
 # jax's settings for promotion of dtypes and of ranks, which replace the caller's; tests use the strictest.
 PROMOTION = ("standard", "allow")
 
@@ -61,9 +66,8 @@ def nan_ignoring_min(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Ar
 def minimum_of(
     values: Float[Array, "..."], axis: Any = None, *, keepdims: bool = False, initial: float | None = None
 ) -> Float[Array, "..."]:
-    """Smallest of the values along axes; NaN where one of them is NaN."""
-    # In place of `jnp.min`: from jaxlib 0.10.2 on, XLA hands minima of some 4000 values or more to a library that
-    # leaves NaN out, and bounds that do not exist would count as infinitely good ones.
+    """Smallest of the values along axes; NaN where one of them is NaN, also where XLA leaves NaN out of minima."""
+    # Bounds that do not exist are NaN, and would count as infinitely good ones.
     return _with_nan(jnp.min(values, axis=axis, keepdims=keepdims, initial=initial), values, axis, keepdims)
 
 
@@ -74,8 +78,28 @@ def maximum_of(
     return _with_nan(jnp.max(values, axis=axis, keepdims=keepdims, initial=initial), values, axis, keepdims)
 
 
+@functools.cache
+def keeps_nan() -> bool:
+    """Tell whether XLA keeps NaN here; if not, a warning says how it would."""
+    if kept_nan.was_set_in_time():
+        return True
+    values = np.ones(_MANY, np.float32)
+    values[0] = np.nan
+    with jax.ensure_compile_time_eval():
+        kept = bool(_are_nan(values).all())
+    if not kept:
+        lines = "XLA leaves NaN out of minima here, so that proofs test for it, which takes longer: set the environment"
+        warnings.warn(f"{lines} variable XLA_FLAGS={kept_nan.FLAG} before jax computes", stacklevel=2)
+    return kept
+
+
+@jax.jit
+def _are_nan(values: Float[Array, "n"]) -> Float[Array, "2"]:
+    return jnp.isnan(jnp.stack([values.min(), jnp.minimum(values, 0.0).sum()]))
+
+
 def _with_nan(extreme: Array, values: Array, axis: Any, keepdims: bool) -> Array:
-    if not jnp.issubdtype(extreme.dtype, jnp.floating):
+    if keeps_nan() or not jnp.issubdtype(extreme.dtype, jnp.floating):
         return extreme
     return jnp.where(jnp.isnan(values).any(axis=axis, keepdims=keepdims), jnp.nan, extreme)
 
@@ -91,10 +115,11 @@ def length(vector: Float[Array, "n"]) -> Float[Array, ""]:
 _users: list[int] = []
 
 
-def _refuse_fork() -> None:
-    # Refuse computations in forked processes, where jax would wait for ever.
+def _begin() -> None:
+    # Set the flag of XLA at first, and refuse computations in forked processes, where jax would wait for ever.
     if not _users:
         _users.append(os.getpid())
+        kept_nan.set_flag()  # in time unless the caller has computed with jax before
     if _users[0] != os.getpid():
         raise RuntimeError(
             "this process was forked from one that had used jax, and would wait for ever: start processes by "
@@ -108,7 +133,7 @@ def double_precision() -> Iterator[None]:
 
     The most important setting is 64 bits, since verdicts are in float64. NaN is a valid result in places, not an error.
     """
-    _refuse_fork()
+    _begin()
     with contextlib.ExitStack() as stack:
         for setting in (
             jax.enable_x64(True),

@@ -25,6 +25,7 @@ import jax
 import jaxlib.version
 import numpy as np
 
+from cspr_jax.numerics.elementary import keeps_nan
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.packed import inflated
@@ -205,7 +206,8 @@ def _settings() -> list[str]:
     of_process = [
         f"{name}={value}" for name, value in sorted(jax.config.values.items()) if not name.startswith(_IRRELEVANT)
     ]
-    return [*of_process, *(f"{name}={getattr(jax.config, name)}" for name in _SETTINGS)]
+    of_thread = [f"{name}={getattr(jax.config, name)}" for name in _SETTINGS]
+    return [*of_process, *of_thread, f"keeps_nan={keeps_nan()}"]
 
 
 def _versions() -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Settings that the command line makes before jax starts: vector width, folder of compiled code, device, memory arenas.
+"""Settings that the command line makes before jax starts: vector width, NaN, folder of compiled code, device, memory.
 
 They are environment variables, which child processes inherit; arenas are set for this process too. The user's own
 settings take precedence. From Python, only `keep_compiled_code` uses this module.
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import ConfigError, printable, shown
+from cspr_jax.numerics import kept_nan
 from cspr_jax.numerics.cores import VARIABLE, cores, quota
 from cspr_jax.runtime import compile_cache, stages
 from cspr_jax.runtime.compile_options import QUICK
@@ -75,12 +76,12 @@ def prepare(
     if math.isfinite(quota()):
         os.environ.setdefault(VARIABLE, str(cores()))  # XLA would start a thread for each core of the machine
     folder, flags = _folder(None, warn), os.environ.get("XLA_FLAGS", "")
-    if flags.strip():
+    if flags.strip() not in ("", kept_nan.with_flag("")):
         _check_flags(folder, flags)
-    if folder is None:
-        return
-    os.environ["XLA_FLAGS"] = _flags(folder, flags, quick=quick)
-    if CACHE not in os.environ:
+    if folder is not None:
+        os.environ["XLA_FLAGS"] = _flags(folder, flags, quick=quick)
+    kept_nan.set_flag()
+    if folder is not None and CACHE not in os.environ:
         _keep(folder, warn)
 
 

@@ -19,7 +19,7 @@ import pytest
 
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.numerics import batches
+from cspr_jax.numerics import batches, kept_nan
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.runtime import compile_cache, compile_options, packed, xla
 
@@ -70,8 +70,7 @@ def test_settings_of_the_user_win(tmp_path):
     """Ours stand before theirs, so that XLA takes theirs; their folder and an empty CSPR_CACHE_DIR are left alone."""
     code = SEEN.format(device=None)
     plain = json.loads(told(with_known_flags(tmp_path), code))
-    wide = plain["XLA_FLAGS"] == xla.WIDE
-    assert wide or plain["XLA_FLAGS"] == ""
+    assert plain["XLA_FLAGS"] in (kept_nan.with_flag(""), kept_nan.with_flag(xla.WIDE))
     assert Path(plain["JAX_COMPILATION_CACHE_DIR"]).is_relative_to(tmp_path) and plain["JAX_PLATFORMS"] is None
     theirs = "--xla_cpu_prefer_vector_width=256"
     given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs, JAX_COMPILATION_CACHE_DIR="/elsewhere"))
@@ -80,7 +79,7 @@ def test_settings_of_the_user_win(tmp_path):
     assert json.loads(told(tmp_path, code, TF_CPP_MIN_LOG_LEVEL="0"))["TF_CPP_MIN_LOG_LEVEL"] == "0"
     nothing = json.loads(told("", SEEN.format(device='"cpu"')))
     assert nothing.pop("TF_CPP_MIN_LOG_LEVEL") == "3"
-    assert nothing == {"XLA_FLAGS": None, "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
+    assert nothing == {"XLA_FLAGS": kept_nan.with_flag(""), "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
 
 
 @pytest.mark.thorough
@@ -93,11 +92,11 @@ def test_plans_compile_in_less_time_and_flags_of_the_user_are_not_set_twice(tmp_
     assert json.loads(told(tmp_path, code, JAX_PLATFORMS="cuda,cpu"))["JAX_PLATFORMS"] == "cuda,cpu"
     assert json.loads(told(tmp_path, SEEN.format(device='"gpu", quick=True')))["JAX_PLATFORMS"] is None
     assert json.loads(told(tmp_path, SEEN.format(device="prefers_cpu=True")))["JAX_PLATFORMS"] == "cpu"
-    assert [flag for flag in ours if flag != xla.WIDE] == list(xla.QUICK)
+    assert [flag for flag in ours if flag not in (xla.WIDE, kept_nan.FLAG)] == list(xla.QUICK)
     theirs = "--xla_backend_optimization_level=3"
     given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs))["XLA_FLAGS"].split()
     assert given[-1] == theirs and sum("optimization_level" in flag for flag in given) == 1
-    assert set(given) - {theirs, xla.WIDE} == set(xla.QUICK[1:])
+    assert set(given) - {theirs, xla.WIDE, kept_nan.FLAG} == set(xla.QUICK[1:])
 
 
 def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatch):
