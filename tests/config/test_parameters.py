@@ -15,6 +15,7 @@ from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.outputs.plots.robots.robot_at import spools_of
 from cspr_jax.plans.cell_plan import cell_plan
 
 SPOOLS = np.array([[0.5, -0.3, 0.0], [-0.5, -0.3, 0.1], [0.0, 0.6, 0.0]])
@@ -256,6 +257,10 @@ def test_axes_of_parameters_are_the_maps_of_their_robots(folder):
     plan = cspr_jax.plan(cell_plan(result.settings, result.coordinates(index), cell))
     assert float(plan.problem.robot.mass) == pytest.approx(0.3)
     np.testing.assert_allclose(plan.answers.duration, cell["duration"], rtol=1e-12)
+    # Pictures show its spools, and none where they depend on what is not fixed; the load does not move them.
+    shown = spools_of(result, {"parameter.width": 1.5})
+    np.testing.assert_allclose(shown, SPOOLS + [[0.25, 0, 0], [-0.25, 0, 0], [0, 0, 0]])
+    assert spools_of(result, {"parameter.load": 0.2}) is None
 
 
 def test_maps_over_robots_are_verified_and_joined(folder):

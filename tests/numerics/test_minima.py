@@ -47,6 +47,19 @@ def test_parabolas_do_not_reach_across_what_does_not_count():
     np.testing.assert_array_equal(vertex_values(tau, values), values)
 
 
+def test_a_start_that_may_become_the_best_is_followed():
+    """A bowl is lower at first than the samples beside a steep kink, which falls below it between them."""
+    kink = 0.7 + 0.1 * 0.44 / 8
+
+    def bowl_and_kink(tau):
+        return np.minimum((tau - 0.3) ** 2, 5.0 * np.abs(tau - kink) - 0.01)[..., None]
+
+    tau = np.linspace(0.0, 1.0, 11)
+    chosen = np.array([[[3], [7]]])
+    smallest, when = followed(bowl_and_kink, tau[None], chosen, rounds=7, n_followed=2)
+    np.testing.assert_allclose([smallest[0, 0], when[0, 0]], [-0.01, kink], atol=1e-6)
+
+
 def test_starts_that_cannot_become_the_best_are_given_up():
     """Of waves and kinks of two heights; starts of nearly equal values are followed to their ends."""
     rng = np.random.default_rng(8)
