@@ -128,3 +128,28 @@ def test_a_pair_of_cables_is_on_one_winch():
     differing = cspr_jax.with_cables(six, winch={"drum_radius": [0.02, 0.03, 0.03, 0.03, 0.04, 0.04]})
     with pytest.raises(InputError, match="their numbers differ"):
         cspr_jax.three_cable_equivalent(differing)
+
+
+def test_tensions_within_limits_of_motors_are_those_whose_demands_are():
+    """Just inside the ends all demands keep the limits; just outside, one does not; a cable at rest winds and pays."""
+    line = {"motor_stall_torque": 1.2, "motor_no_load_speed": 400.0}
+    winches, rng = _winches(**line), np.random.default_rng(4)
+    limits = cspr_jax.Limits(motor_torque_max=0.6, motor_power_max=20.0, motor_load_max=0.8)
+    lengths, rates, accelerations = rng.uniform(1, 3, (3, 400, 3)) * np.array([1.0, 0.4, 9.0])[:, None, None]
+    rates[::2] *= -1.0
+    accelerations[::3] *= -1.0
+    rates[:20] = 0.0
+    motions = lengths, rates, accelerations
+
+    def within(length, rate, acceleration):
+        unbounded = jax.numpy.full(3, -1e3), jax.numpy.full(3, 1e3)
+        return jax.numpy.stack(w.tensions_within(winches, limits, (length, rate, acceleration), unbounded))
+
+    def excess(tensions):
+        demands = _each(lambda w_, *row: w.motor_demands(w_, row[:3], row[3]), winches, *motions, tensions)
+        return np.max([demands.motor_torque - 0.6, demands.motor_power - 20.0, demands.motor_load - 0.8], axis=0)
+
+    low, high = np.moveaxis(np.asarray(jax.vmap(within)(*motions)), 1, 0)
+    assert (low < high).all()
+    for end, outside in ((low, -1e-6), (high, 1e-6)):
+        assert (excess(end - outside) <= 0.0).all() and (excess(end + outside) > 0.0).all()
