@@ -258,8 +258,8 @@ def test_axes_of_parameters_are_the_maps_of_their_robots(folder):
     assert float(plan.problem.robot.mass) == pytest.approx(0.3)
     np.testing.assert_allclose(plan.answers.duration, cell["duration"], rtol=1e-12)
     # Pictures show its spools, and none where they depend on what is not fixed; the load does not move them.
-    shown = spools_of(result, {"parameter.width": 1.5})
-    np.testing.assert_allclose(shown, SPOOLS + [[0.25, 0, 0], [-0.25, 0, 0], [0, 0, 0]])
+    wider = np.array([[0.25, 0, 0], [-0.25, 0, 0], [0, 0, 0]])
+    np.testing.assert_allclose(spools_of(result, {"parameter.width": 1.5}), SPOOLS + wider)
     assert spools_of(result, {"parameter.load": 0.2}) is None
 
 
