@@ -90,10 +90,18 @@ def numbers_of(option: str, text: str, counts: tuple[int, ...] = (), *, is_posit
     return values
 
 
+def check_picture_format(path: Path) -> None:
+    """Refuse a name of a picture whose ending is no format of pictures."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    if path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise ConfigError("-o", f"{path}: must end in .png, .pdf, .svg or another picture format")
+
+
 def checked_picture(options: argparse.Namespace) -> dict[str, Any]:
     """Options of style of a picture that -o names, refused before slow work where they or the file are wrong."""
-    if options.output is not None and not options.output.suffix:
-        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
+    if options.output is not None:
+        check_picture_format(options.output)
     check_writable(options.output)
     from cspr_jax.outputs.plots.style.style import style_of  # loads matplotlib
 

@@ -3,8 +3,17 @@
 import argparse
 from pathlib import Path
 
-from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, print_path, warn
-from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.cli.command import (
+    Command,
+    add_all_errors,
+    add_device,
+    add_output,
+    check_picture_format,
+    prepare_jax,
+    print_path,
+    warn,
+)
+from cspr_jax.errors import ExitCode
 from cspr_jax.outputs.plots.style.options import ACCELERATION, add_best, add_motion_plan, add_plot
 from cspr_jax.runtime.progress import waiting
 
@@ -18,8 +27,7 @@ def _plot(options: argparse.Namespace) -> int:
     if options.quantity == ACCELERATION or options.robot is not None:  # only these pictures compute something
         prepare_jax(options, quick=options.quantity != ACCELERATION)
     output = options.output or results[0].with_suffix(".png")
-    if not output.suffix:
-        raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
+    check_picture_format(output)
     names = (
         "quantity",
         "best",

@@ -285,6 +285,7 @@ pose = [{ position = [0, 0, 1.2], time = 0 }, { position = [0.1, 0, 1.1], time =
     [
         (("--instants", "0"), "--instants: 0: must be a whole number from 1 to 10000"),
         (("-o", "picture"), "must end in .png"),
+        (("-o", "picture.xyz"), "must end in .png"),
         (("--without", "7"), "without = [7]: must be cables of p, from 0 to 1"),
         (("--without", "1", "1"), "each once"),
     ],

@@ -95,6 +95,7 @@ def test_motors_at_standstill_hold_the_cables():
         ({"drum_radius": None}, "winch.drum_radius: missing: a number > 0"),
         ({"drum_radius": [0.1, 0.2]}, "winch.drum_radius = [0.1, 0.2]: must be a number > 0, at most 1e+06, or 3"),
         ({"efficiency": 1.2}, "winch.efficiency = 1.2: must be a number > 0, at most 1"),
+        ({"encoder_counts": 10.5}, "winch.encoder_counts = 10.5: must be a whole number > 0"),
         ({"drum": 0.5}, "winch.drum = 0.5: must be absent"),
         ({"direction": 0.5}, "winch.direction = 0.5: must be 1 or -1"),
         ({"layer_turns": 8.0}, "winch.cable_length: missing: given beside layer_turns"),

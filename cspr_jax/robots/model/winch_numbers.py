@@ -16,6 +16,7 @@ class WinchNumber:
         from_zero: whether 0 is allowed in addition to positive values.
         largest: largest value.
         is_required: whether every winch has it.
+        is_whole: whether only whole numbers are allowed.
     """
 
     name: str
@@ -25,19 +26,22 @@ class WinchNumber:
     from_zero: bool = False
     largest: float = 1e9
     is_required: bool = False
+    is_whole: bool = False
 
     @property
     def allowed(self) -> str:
         """Allowed values, in words."""
         if self.name == "direction":
             return "1 or -1"
-        return f"a number {'>=' if self.from_zero else '>'} 0" + f", at most {self.largest:g}" * (self.largest < 1e9)
+        kind = "a whole number" if self.is_whole else "a number"
+        return f"{kind} {'>=' if self.from_zero else '>'} 0" + f", at most {self.largest:g}" * (self.largest < 1e9)
 
     def is_allowed(self, value: float) -> bool:
         """Tell whether a number may be its value."""
         if self.name == "direction":
             return value in (1.0, -1.0)
-        return (value >= 0.0 if self.from_zero else value > 0.0) and value <= self.largest
+        is_in_range = (value >= 0.0 if self.from_zero else value > 0.0) and value <= self.largest
+        return is_in_range and (not self.is_whole or float(value).is_integer())
 
 
 WINCH_NUMBERS = (
@@ -66,7 +70,7 @@ WINCH_NUMBERS = (
     ),
     WinchNumber("motor_stall_torque", "N m", "torque at standstill of the line that falls with speed"),
     WinchNumber("motor_no_load_speed", "rad/s", "speed at which that line has no torque"),
-    WinchNumber("encoder_counts", "1", "counts of the encoder for one turn of the motor"),
+    WinchNumber("encoder_counts", "1", "counts of the encoder for one turn of the motor", is_whole=True),
 )
 # Numbers that are given together, or not at all.
 TOGETHER = (("layer_turns", "cable_length"), ("motor_stall_torque", "motor_no_load_speed"))
