@@ -86,11 +86,11 @@ def keeps_nan() -> bool:
     values = np.ones(_MANY, np.float32)
     values[0] = np.nan
     with jax.ensure_compile_time_eval():
-        kept = bool(_are_nan(values).all())
-    if not kept:
+        is_kept = bool(_are_nan(values).all())
+    if not is_kept:
         lines = "XLA leaves NaN out of minima here, so that proofs test for it, which takes longer: set the environment"
         warnings.warn(f"{lines} variable XLA_FLAGS={kept_nan.FLAG} before jax computes", stacklevel=2)
-    return kept
+    return is_kept
 
 
 @jax.jit

@@ -8,7 +8,7 @@ import sys
 FLAG = "--xla_cpu_experimental_ynn_fusion_type="
 # Versions of jaxlib that know the flag and need it. XLA ends a process that sets flags which it does not know.
 _NEED_IT = (0, 10)
-# Whether the flag was set before jax was imported, so that it is certain to be read.
+# Holds True once the flag was set before jax was imported, so that jax is certain to read it.
 _set_before_jax: list[bool] = []
 
 

@@ -34,7 +34,7 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            # Where axes are parameters, each robot of a tile has a map of its own.
+            # Each robot of a tile has a map of its own where axes are parameters.
             self._one = None if parameter_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
             if self._one is not None:
                 self._one.refuse_hopeless(sweep.grid)
