@@ -55,9 +55,6 @@ def check_robots(
 def robots_of(cells: Mapping[str, np.ndarray]) -> Iterator[tuple[dict[str, float], np.ndarray]]:
     """Values of parameters, and indices of the cells that have them, of each robot of a tile."""
     names = parameter_axes(cells)
-    if not names:
-        yield {}, np.arange(len(next(iter(cells.values()))))
-        return
     robots, robot_of_cell = np.unique(np.stack([cells[name] for name in names]), axis=1, return_inverse=True)
     for i, values in enumerate(robots.T):
         yield parameter_values(dict(zip(names, values, strict=True))), np.flatnonzero(robot_of_cell.ravel() == i)

@@ -10,6 +10,7 @@ from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.numerics.batches import in_threads, short_batches
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.schema.quantities import is_parameter
@@ -61,16 +62,28 @@ class TileMap:
 
     def _answers(self, index: int, cells: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int | None]:
         # Answers of the cells of a tile, robot by robot, and the number of them that are undecided.
-        sweep, others = self._sweep, {name: points for name, points in cells.items() if not is_parameter(name)}
-        parts, order = [], []
-        for values, indices in robots_of(cells):
-            one = self._one or _map_of(sweep, robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file))
-            parts.append(one({name: points[indices] for name, points in others.items()}))
-            order.append(indices)
-            _refuse(index, one.contradictions(parts[-1]))
-        back = np.argsort(np.concatenate(order))
-        answers = {name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]}
-        return answers, one.undecided(answers)
+        if self._one is not None:
+            answers = self._one(cells)
+            _refuse(index, self._one.contradictions(answers))
+            return answers, self._one.undecided(answers)
+        sweep, robots = self._sweep, list(robots_of(cells))
+        others = {name: points for name, points in cells.items() if not is_parameter(name)}
+
+        def of_robot(robot: tuple[dict[str, float], np.ndarray]) -> tuple[dict[str, np.ndarray], int | None]:
+            values, indices = robot
+            one = _map_of(sweep, robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file))
+            answers = one({name: points[indices] for name, points in others.items()})
+            _refuse(index, one.contradictions(answers))
+            return answers, one.undecided(answers)
+
+        with short_batches():
+            parts, counts = zip(*in_threads(of_robot, robots), strict=True)
+        order = np.argsort(np.concatenate([indices for _, indices in robots]))
+        names = [
+            name for name, values in parts[0].items() if np.ndim(values)
+        ]  # what has no number a cell is not stored
+        answers = {name: np.concatenate([part[name] for part in parts])[order] for name in names}
+        return answers, None if None in counts else sum(counts)
 
 
 def _map_of(sweep: Sweep, robot_file: RobotFile) -> GridMap:

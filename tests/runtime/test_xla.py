@@ -7,6 +7,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import threading
 import types
 import warnings
 import zlib
@@ -644,6 +645,37 @@ def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
     found = in_batches(doubled, np.arange(700.0), batch_size=32)
     np.testing.assert_array_equal(found, 2.0 * np.arange(700.0))
     assert set(shapes) == {length} and len(shapes) == -(-700 // length)
+
+
+@pytest.mark.parametrize(("count", "lengths"), [(150, [64, 64, 16, 16]), (49, [64]), (48, [16] * 3), (3, [16])])
+def test_short_batches_hold_what_is_left_over(monkeypatch, count, lengths):
+    shapes = []
+    monkeypatch.setattr(batches, "LARGEST", 1 << 20)
+
+    def doubled(x):
+        shapes.append(len(x))
+        return 2.0 * x
+
+    with batches.short_batches():
+        found = in_batches(doubled, np.arange(float(count)), batch_size=64)
+    np.testing.assert_array_equal(found, 2.0 * np.arange(count))
+    assert shapes == lengths
+    in_batches(doubled, np.arange(3.0), batch_size=64)
+    assert shapes[-1] == 64
+
+
+def test_threads_start_no_further_threads(monkeypatch):
+    """And batches are short in them as they are outside."""
+    monkeypatch.setattr(batches, "cores", lambda: 2)
+
+    def name(_):
+        return threading.current_thread().name, batches._has_short_batches.get()
+
+    with batches.short_batches():
+        seen = batches.in_threads(lambda _: (name(0), batches.in_threads(name, range(3))), range(4))
+    assert all(inner == [outer] * 3 and outer[1] for outer, inner in seen)
+    assert threading.current_thread().name not in {outer[0] for outer, _ in seen}
+    assert {thread for thread, _ in batches.in_threads(name, range(2))} != {threading.current_thread().name}
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 128])
