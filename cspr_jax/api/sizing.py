@@ -18,7 +18,7 @@ from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.config.reading import checked as checked_keys
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.sweep import SweepFile, sweep_spec
 from cspr_jax.errors import ConfigError
 from cspr_jax.errors.arguments import Kind, Positive
 from cspr_jax.machine.sizing import MotionDemands, holding_demands, joint_cycle, motor_demands, winding_curves
@@ -28,6 +28,7 @@ from cspr_jax.outputs.machine.sizing_report import WITH_FACTOR, size_object, siz
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import is_of_robot
 from cspr_jax.workspaces.map import WorkspaceMap
 
 if TYPE_CHECKING:
@@ -216,13 +217,15 @@ def _check_winches(robot_file: RobotFile, name: str) -> None:
 
 
 def _workspace(result: Result, name: str) -> _StaticPoses:
-    settings = {key: value for key, value in result.settings.items() if key != "dimensions"}
+    settings = sweep_spec(result.settings)
     if settings.get("map") != "workspace":
         kind = f'a map "{settings["map"]}"' if settings else "a motion"
         raise ConfigError(name, f'{kind}: must be a plan, or a finished map "workspace"; for motions give --robot too')
     spec = checked_keys(SweepFile, settings, Path(name))
     if not {"static", "wrench-feasible"} & set(spec.workspace.conditions if spec.workspace else ()):
         raise ConfigError(name, 'workspace.conditions: must hold "static" or "wrench-feasible": poses that cables hold')
+    for axis in filter(is_of_robot, result.axes):
+        raise ConfigError(name, f"axes.{axis}: must be absent: motors are sized for one robot")
     if spec.without == ANY_ONE:
         allowed = "must be absent or list cables: motors are sized for one robot"
         raise ConfigError(name, f'without = "{ANY_ONE}": {allowed}')

@@ -1,6 +1,7 @@
 """Parameters of robot files: named numbers that move others by multiples of their change; without jax."""
 
 import copy
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -11,7 +12,8 @@ from cspr_jax.config.keys.parameter import ParameterTable
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.errors.suggestions import did_you_mean
-from cspr_jax.schema.quantities import PARAMETER
+from cspr_jax.robots.model.arrangements import arrangement_of
+from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER
 
 # Fraction of the bounds by which rounding may put a value beyond them.
 ROUNDING = 1e-12
@@ -24,8 +26,8 @@ def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, An
     """Refuse parameters of one name, that move what is no number of the file, or that move themselves."""
     names = [parameter.name for parameter in parameters]
     for i, name in enumerate(names):
-        if name in names[:i]:
-            raise table_error(f"parameter[{i}].name", name, "a name that no other parameter has")
+        if name in [*names[:i], ARRANGEMENT]:
+            raise table_error(f"parameter[{i}].name", name, f"a name that no other parameter has, nor {ARRANGEMENT}")
     numbers = [*dict(_numbers(spec)), *(key for key, points in SCALES.items() if spec.get(points) is not None)]
     targets = {*numbers, *(PARAMETER + name for name in names)}
     for i, parameter in enumerate(parameters):
@@ -62,10 +64,44 @@ def moved(
     Raises:
         InputError: no parameter has this name, a value is beyond its bounds, or a scale is not positive.
     """
-    changes = _changes(parameters, values)
-    if not any(changes.values()):
+    number = _arrangement(spec, values)
+    changes = _changes(parameters, {name: value for name, value in values.items() if name != ARRANGEMENT})
+    if not any(changes.values()) and not number:
         return None
-    return _moved(spec, changes), [_moved_parameter(table, spec, changes) for table in parameters]
+    tables = [_moved_parameter(table, spec, changes) for table in parameters]
+    return _arranged(_moved(spec, changes), tables, number) if number else (_moved(spec, changes), tables)
+
+
+def _arrangement(spec: Mapping[str, Any], values: Mapping[str, float]) -> int:
+    # Number of the arrangement among the values; 0 where there is none.
+    number, points = values.get(ARRANGEMENT, 0.0), spec.get("platform_points")
+    if ARRANGEMENT in values and points is None:
+        raise InputError(f"parameters.{ARRANGEMENT}", number, "absent: all cables of a point mass end in it")
+    largest = math.factorial(len(points or ())) - 1
+    is_whole = float(number).is_integer()
+    if not is_whole or not 0 <= number <= largest:
+        value = int(number) if is_whole else number
+        raise InputError(f"parameters.{ARRANGEMENT}", value, f"a whole number from 0 to {largest}")
+    return int(number)
+
+
+def _arranged(
+    spec: dict[str, Any], tables: list[ParameterTable], number: int
+) -> tuple[dict[str, Any], list[ParameterTable]]:
+    # Attachment points in another order, with the parameters that move them.
+    points = spec["platform_points"]
+    arrangement = arrangement_of(number, len(points))
+    cables = {f"platform_points[{old}]": f"platform_points[{new}]" for new, old in enumerate(arrangement)}
+
+    def renamed(key: str) -> str:
+        first = key.find("]") + 1
+        return cables.get(key[:first], key[:first]) + key[first:]
+
+    moved_tables = [
+        table.model_copy(update={"moves": {renamed(key): multiple for key, multiple in table.moves.items()}})
+        for table in tables
+    ]
+    return spec | {"platform_points": [points[old] for old in arrangement]}, moved_tables
 
 
 def _changes(parameters: Sequence[ParameterTable], values: Mapping[str, float]) -> dict[str, float]:

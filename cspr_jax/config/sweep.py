@@ -20,7 +20,7 @@ from cspr_jax.config.keys.ellipse import SweepEllipse
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import Coordinate, LimitTable, Point
 from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
-from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, ParameterValues
+from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, Arrangements, ParameterValues
 from cspr_jax.config.keys.path import TargetPath
 from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
@@ -33,6 +33,8 @@ from cspr_jax.schema.quantities import PARAMETER, PARAMETER_NAME, QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
+# Settings of a run that follow from keys and robot: names of all axes, and number of arrangements.
+RESOLVED = ("dimensions", "arrangements")
 
 
 class AxisRange(Table):
@@ -112,6 +114,12 @@ class Axes(Table):
         description='"parameter.NAME": values of a parameter of the robot file, so that cells are of different robots',
     )
 
+    arrangement: Arrangements | None = Field(
+        None,
+        description='platforms: arrangements of the cables, "all" but symmetric copies, a list of permutations such as '
+        "[1, 0, 2, 3] (the cable of spool 0 ends in attachment point 1), or a list of their numbers",
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _of_parameters(cls, data: Any) -> Any:
@@ -137,6 +145,11 @@ class Axes(Table):
         if name.startswith(PARAMETER):
             return (self.parameter or {}).get(name.removeprefix(PARAMETER))
         return getattr(self, name)
+
+
+def sweep_spec(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a sweep file among the settings that a run has recorded."""
+    return {key: value for key, value in settings.items() if key not in RESOLVED}
 
 
 def axis_names(axes: Mapping[str, Any]) -> list[str]:

@@ -104,6 +104,13 @@ AXES = {
         Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
+        Quantity(
+            "arrangement",
+            "1",
+            "arrangement of the cables",
+            "Which attachment point the cable of each spool has: number of a permutation in lexicographic order; 0: as "
+            "in the robot file.",
+        ),
     )
 }
 # Axes that together give an orientation.
@@ -112,6 +119,8 @@ TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 _NO_CHOICES = ("tau", "cable")
 # Beginning of the names of axes that are parameters of the robot, and what the names of parameters are.
 PARAMETER = "parameter."
+# Name of the axis, and of the value among those of parameters, that says which attachment point each cable has.
+ARRANGEMENT = "arrangement"
 PARAMETER_NAME = r"[A-Za-z][A-Za-z0-9_-]{0,49}"
 
 
@@ -1021,9 +1030,14 @@ def is_parameter(name: object) -> bool:
     return isinstance(name, str) and re.fullmatch(re.escape(PARAMETER) + PARAMETER_NAME, name) is not None
 
 
+def is_of_robot(name: object) -> bool:
+    """Tell whether the cells along an axis are of different robots."""
+    return is_parameter(name) or name == ARRANGEMENT
+
+
 def parameter_values(coordinates: Mapping[str, Any]) -> dict[str, float]:
     """Values of the robot's parameters, by their names, among the coordinates of a cell."""
-    return {name.removeprefix(PARAMETER): float(coordinates[name]) for name in coordinates if is_parameter(name)}
+    return {name.removeprefix(PARAMETER): float(coordinates[name]) for name in coordinates if is_of_robot(name)}
 
 
 def row_of(name: str, settings: Mapping[str, Any] | None = None) -> Quantity:

@@ -107,21 +107,26 @@ class Settings(Document):
     """The part of resolved settings that determines the layout of a run.
 
     Fields:
-        axes: axes of the sweep file, each a list or a range with a count.
+        axes: axes of the sweep file, each a list, a range with a count, or "all" arrangements of the cables.
         dimensions: names of all axes in the order of the result.
         orientations: settings of a map over all orientations, whose axes follow from divisions.
         run: shape of a tile, names of the quantities, and their type.
+        arrangements: number of arrangements of the cables, if the axis has all of them.
     """
 
-    axes: dict[str, _Range | Annotated[list[Any], Field(min_length=1, max_length=_LARGEST_COUNT)]]
+    axes: dict[str, _Range | Literal["all"] | Annotated[list[Any], Field(min_length=1, max_length=_LARGEST_COUNT)]]
     dimensions: Annotated[list[Text], Field(min_length=1, max_length=LARGEST_RANK)]
     orientations: _Divisions = _Divisions()
     run: _Run
+    arrangements: Annotated[int, Field(ge=1, le=_LARGEST_COUNT)] = 1
 
     @property
     def tiling(self) -> Tiling:
         """Tiles of the grid."""
-        file_counts = {name: axis.count if isinstance(axis, _Range) else len(axis) for name, axis in self.axes.items()}
+        file_counts = {
+            name: self.arrangements if axis == "all" else axis.count if isinstance(axis, _Range) else len(axis)
+            for name, axis in self.axes.items()
+        }
         step = self.orientations.divisions
         counts = {"torsion": 2 * step, "tilt_azimuth": 2 * step, "tilt": step} | file_counts
         return Tiling(tuple(counts[name] for name in self.dimensions), tuple(self.run.tile))

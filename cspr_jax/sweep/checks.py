@@ -20,7 +20,7 @@ _TARGETS = ("x", "y", "radius", "azimuth", "z")
 _START = ("from_x", "from_y", "from_z")
 # Keys that only some kinds of maps have.
 _SPECIAL = (
-    *(f"axes.{name}" for name in Axes.model_fields if name not in (*_TARGETS, "parameter")),
+    *(f"axes.{name}" for name in Axes.model_fields if name not in (*_TARGETS, "parameter", "arrangement")),
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
     *("trajectory.max_acceleration", "trajectory.rule", "trajectory.path"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),

@@ -18,15 +18,16 @@ from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.parameters import with_values
 from cspr_jax.config.reading import checked, parse_toml, read_text, refuse_other_kinds
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_names, axis_points
+from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_names, sweep_spec
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
+from cspr_jax.schema.quantities import ARRANGEMENT
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.files.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points, check_store, is_asked, is_given
-from cspr_jax.sweep.robots import check_robots, robot_of
+from cspr_jax.sweep.robots import arrangement_axis, axes_of, check_robots, robot_of
 from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Largest number of tiles, each of which is a file.
@@ -104,21 +105,23 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     robot = robot_of(robot, spec, kind, path)
     orientation_axes = _orientation_axes(spec) if kind.is_over_orientations else {}
     names = axis_names(data["axes"])
-    counts = {name: _count(spec.axes.named(name)) for name in names}
-    counts |= {name: len(points) for name, points in orientation_axes.items()}
+    known_axes = arrangement_axis(spec, robot, path) | orientation_axes
+    counts = {name: 0 if name in known_axes else _count(spec.axes.named(name)) for name in names}
+    counts |= {name: len(points) for name, points in known_axes.items()}
     check_store(kind, spec, robot, path)
     store = list(spec.run.store or _usual(kind, spec, robot))
     shape = tuple(counts.values())
     usual = tile_shape(shape, tile_cells(kind, spec, math.prod(shape)))
     tile = usual if spec.run.tile is None else _tile(spec.run.tile, shape, path)
     _check_size(counts, tile, usual, bytes_needed(shape, store, spec.run.dtype), path)
-    axes = {name: axis_points(spec.axes.named(name)) for name in names}
+    axes = axes_of(spec, names, robot, path)
     check_points(axes, path)
     check_robots(robot, spec, kind, axes, path)
     axes |= orientation_axes
     # Leave out keys that are not given, so that keys of later versions do not change old identities.
     settings = spec.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
+    settings |= {"arrangements": len(axes[ARRANGEMENT])} if spec.axes.arrangement == "all" else {}
     settings["run"] |= {"tile": list(tile), "store": store}
     types = {name: dtype_of(name, spec.run.dtype) for name in store}
     return Sweep(path, kind, spec, robot, Grid(axes, tile), store, settings, text, types)
@@ -126,11 +129,11 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
     """The sweep that a run has recorded, even if its file has changed or is gone."""
-    spec = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
+    spec = checked(SweepFile, sweep_spec(settings), file)
     kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
     robot = without_cables(checked(RobotFile, settings["robot"], file, at="robot"), spec.without, file)
     over_orientations = _orientation_axes(spec) if kind.is_over_orientations else {}
-    file_axes = {name: axis_points(spec.axes.named(name)) for name in axis_names(settings["axes"])}
+    file_axes = axes_of(spec, axis_names(settings["axes"]), robot, file)
     axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}
     check_points(file_axes, file)
     run = settings["run"]

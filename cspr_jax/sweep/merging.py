@@ -16,6 +16,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.schema.identity import differences, digest
+from cspr_jax.schema.quantities import ARRANGEMENT
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.schema.verdicts import NOT_PROVED
 from cspr_jax.store.documents import plain_json, read_record
@@ -218,7 +219,8 @@ def _free_axes(parts: Sequence[Part]) -> list[str]:
 def _fixed(settings: dict[str, Any], free: set[str]) -> dict[str, Any]:
     # Settings that all parts must share, except how axes with equal points are written, and the shape of tiles.
     axes = [name for name in settings["axes"] if name not in free]
-    return settings | {"axes": axes, "run": {key: value for key, value in settings["run"].items() if key != "tile"}}
+    run = {key: value for key, value in settings["run"].items() if key != "tile"}
+    return settings | {"axes": axes, "run": run, "arrangements": None}
 
 
 def _joined(parts: Sequence[Part]) -> Sweep:
@@ -229,7 +231,8 @@ def _joined(parts: Sequence[Part]) -> Sweep:
     (axis,) = free
     settings = copy.deepcopy(first.settings)
     points = np.unique(np.concatenate([part.sweep.grid.axes[axis] for part in parts]))
-    settings["axes"][axis] = points.tolist()
+    settings["axes"][axis] = points.astype(int).tolist() if axis == ARRANGEMENT else points.tolist()
+    settings.pop("arrangements", None)
     shape = [len(points) if name == axis else len(values) for name, values in first.grid.axes.items()]
     settings["run"]["tile"] = [min(tile, length) for tile, length in zip(first.grid.tile, shape, strict=True)]
     return sweep_of_settings(settings, first.file, first.text)

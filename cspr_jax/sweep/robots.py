@@ -1,19 +1,20 @@
 """Robots of the cells of a sweep: axes may be parameters of the robot file."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cspr_jax.config.arrangements import arrangement_points
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.schema.map_kinds import MapKind
-from cspr_jax.schema.quantities import PARAMETER, is_parameter, parameter_values
+from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER, is_of_robot, parameter_values
 
 
 def robot_of(robot_file: RobotFile, spec: SweepFile, kind: MapKind, file: object) -> RobotFile:
@@ -29,19 +30,38 @@ def robot_at(
     try:
         return robot_of(robot_file.full.with_parameters(values), spec, kind, file)
     except InputError as error:
-        raise ConfigError(file, str(error).replace("parameters.", f"axes.{PARAMETER}", 1)) from error
+        at = "axes." if str(error).startswith(f"parameters.{ARRANGEMENT} ") else f"axes.{PARAMETER}"
+        raise ConfigError(file, str(error).replace("parameters.", at, 1)) from error
 
 
-def parameter_axes(axes: Mapping[str, Any]) -> list[str]:
-    """Names of the axes that are parameters."""
-    return [name for name in axes if is_parameter(name)]
+def arrangement_axis(spec: SweepFile, robot_file: RobotFile, file: object) -> dict[str, np.ndarray]:
+    """The axis of arrangements of a sweep file, if it has one."""
+    if spec.axes.arrangement is None:
+        return {}
+    has_lists = any(isinstance(value, list) for value in vars(spec.limits).values())
+    try:
+        points = arrangement_points(robot_file.full, spec.axes.arrangement, has_lists=has_lists)
+    except InputError as error:
+        raise ConfigError(file, f"axes.{error}") from error
+    return {ARRANGEMENT: points}
+
+
+def axes_of(spec: SweepFile, names: Iterable[str], robot_file: RobotFile, file: object) -> dict[str, np.ndarray]:
+    """Points of the axes of a sweep file."""
+    axes = arrangement_axis(spec, robot_file, file)
+    return {name: axes[name] if name in axes else axis_points(spec.axes.named(name)) for name in names}
+
+
+def robot_axes(axes: Mapping[str, Any]) -> list[str]:
+    """Names of the axes along which robots differ."""
+    return [name for name in axes if is_of_robot(name)]
 
 
 def check_robots(
     robot_file: RobotFile, spec: SweepFile, kind: MapKind, axes: Mapping[str, np.ndarray], path: Path
 ) -> None:
     """Refuse axes of parameters that the robot does not have, or that give no robot at their ends."""
-    names = parameter_axes(axes)
+    names = robot_axes(axes)
     for name in names:
         parameter = name.removeprefix(PARAMETER)
         if parameter in (spec.parameters or {}):
@@ -54,7 +74,9 @@ def check_robots(
 
 def robots_of(cells: Mapping[str, np.ndarray]) -> Iterator[tuple[dict[str, float], np.ndarray]]:
     """Values of parameters, and indices of the cells that have them, of each robot of a tile."""
-    names = parameter_axes(cells)
+    names = robot_axes(cells)
     robots, robot_of_cell = np.unique(np.stack([cells[name] for name in names]), axis=1, return_inverse=True)
-    for i, values in enumerate(robots.T):
-        yield parameter_values(dict(zip(names, values, strict=True))), np.flatnonzero(robot_of_cell.ravel() == i)
+    order = np.argsort(robot_of_cell.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(robot_of_cell.ravel()))
+    for values, indices in zip(robots.T, np.split(order, ends[:-1]), strict=True):
+        yield parameter_values(dict(zip(names, values, strict=True))), indices

@@ -13,11 +13,11 @@ from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.numerics.batches import in_threads, short_batches
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
-from cspr_jax.schema.quantities import is_parameter
+from cspr_jax.schema.quantities import is_of_robot
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
-from cspr_jax.sweep.robots import parameter_axes, robot_at, robots_of
+from cspr_jax.sweep.robots import robot_at, robot_axes, robots_of
 from cspr_jax.sweep.work import Computed
 
 # Margins this close to zero may have another sign on another processor; results contain the number of such cells.
@@ -36,7 +36,7 @@ class TileMap:
         self._sweep = sweep
         with double_precision():
             # Each robot of a tile has a map of its own where axes are parameters.
-            self._one = None if parameter_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
+            self._one = None if robot_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
             if self._one is not None:
                 self._one.refuse_hopeless(sweep.grid)
 
@@ -67,7 +67,7 @@ class TileMap:
             _refuse(index, self._one.contradictions(answers))
             return answers, self._one.undecided(answers)
         sweep, robots = self._sweep, list(robots_of(cells))
-        others = {name: points for name, points in cells.items() if not is_parameter(name)}
+        others = {name: points for name, points in cells.items() if not is_of_robot(name)}
 
         def of_robot(robot: tuple[dict[str, float], np.ndarray]) -> tuple[dict[str, np.ndarray], int | None]:
             values, indices = robot

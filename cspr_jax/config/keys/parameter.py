@@ -1,9 +1,10 @@
 """Keys of parameters in robot files, and of their values in plans and sweeps."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
+from cspr_jax.config.keys.limits import MAX_CABLES
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import shown
@@ -11,11 +12,32 @@ from cspr_jax.schema.quantities import PARAMETER_NAME
 
 LARGEST_VALUE = 1e12
 MAX_PARAMETERS, MAX_MOVES = 100, 10_000
+MAX_ARRANGEMENTS = 10_000_000
 
 Value = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE)]
 # Values that a plan or a sweep gives to parameters of its robot.
 ParameterValues = Annotated[dict[str, Value], Field(min_length=1, max_length=MAX_PARAMETERS)]
-VALUES_DESCRIPTION = "{ NAME = value, ... }: values of parameters of the robot file; all others stay as in the file"
+VALUES_DESCRIPTION = (
+    "{ NAME = value, ... }: values of parameters of the robot file; all others stay as in the file; of any platform "
+    "`arrangement`, the number of the permutation that leads its cables to their attachment points"
+)
+Cable = Annotated[int, Field(ge=0, lt=MAX_CABLES)]
+Number = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
+# Arrangements of the cables along an axis of a sweep.
+Arrangements = Annotated[
+    Annotated[Literal["all"], Tag("~all")]
+    | Annotated[list[Number], Field(min_length=1, max_length=MAX_ARRANGEMENTS, fail_fast=True), Tag("~numbers")]
+    | Annotated[
+        list[Annotated[list[Cable], Field(max_length=MAX_CABLES)]],
+        Field(min_length=1, max_length=MAX_ARRANGEMENTS, fail_fast=True),
+        Tag("~lists"),
+    ],
+    Discriminator(lambda value: "~all" if isinstance(value, str) else _kind_of_list(value)),
+]
+
+
+def _kind_of_list(value: object) -> str:
+    return "~lists" if isinstance(value, list) and value and isinstance(value[0], list) else "~numbers"
 
 
 class ParameterTable(Table):

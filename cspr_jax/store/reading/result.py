@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.config.keys.limits import LARGEST_LENGTH, MAX_CABLES
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.sweep import SweepFile, sweep_spec
 from cspr_jax.errors import ConfigError, InputError, StoreError, printable, shown
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
@@ -24,6 +24,7 @@ from cspr_jax.schema.quantities import (
     SEGMENTS,
     TRAJECTORY,
     is_axis,
+    is_of_robot,
 )
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.files.checksum import DamagedError
@@ -187,7 +188,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
 def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
     # Settings are the content of a sweep file, with its robot and the order of the axes.
     settings = _json(attributes, "settings")
-    checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
+    checked(SweepFile, sweep_spec(settings), path, at="settings")
     robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
     order = settings.get("dimensions")
     if not isinstance(order, list) or not order or not all(map(is_axis, order)):
@@ -224,7 +225,7 @@ def _map(
     for name, points in axes.items():
         if points.dtype != np.float64 or points.ndim != 1 or not points.size:
             raise DamagedError(f"axis {name} is not a list of numbers")
-        _check_numbers(name, points, LARGEST_LENGTH)
+        _check_numbers(name, points, LARGEST_NUMBER if is_of_robot(name) else LARGEST_LENGTH)
     shape = tuple(points.size for points in axes.values())
     for name, array in data.items():
         if array.shape != shape or array.dtype.name not in QUANTITIES[name].readable:

@@ -16,7 +16,7 @@ from cspr_jax.numerics.shapes import Float, Num
 from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.outputs.plots.style.fixed_axes import table
 from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
-from cspr_jax.schema.quantities import is_parameter, parameter_values
+from cspr_jax.schema.quantities import is_of_robot, parameter_values
 from cspr_jax.store.reading.result import Result
 
 ON_ARC = 9  # number of points through which an arc is drawn, including its ends
@@ -50,7 +50,7 @@ def robot_of(result: Result, coordinates: Mapping[str, float] | None = None) -> 
 def spools_of(result: Result, coordinates: Mapping[str, float]) -> Float[np.ndarray, "n 3"] | None:
     """Spools of the robot in a cell; None where they depend on parameters that have no coordinate."""
     axes = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
-    names = [name for name in axes if is_parameter(name)]
+    names = [name for name in axes if is_of_robot(name)]
     if not names:
         return np.asarray(result.attributes["base_points"], float) if "base_points" in result.attributes else None
     fixed = {name: value for name, value in coordinates.items() if name not in result.choices}

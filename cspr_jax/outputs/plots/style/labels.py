@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.plots.style.fitting import shortened
-from cspr_jax.schema.quantities import PARAMETER
+from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER
 from cspr_jax.store.reading.result import Result
 
 # Words for axes whose names in files are not words.
@@ -109,6 +109,8 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     name = _name(axis)
     if axis == "cable":
         return f"{name} {drawn:g}"
+    if axis == ARRANGEMENT:
+        return f"{name} = {drawn:.0f}"
     return f"{name} = {drawn:.{digits}g}" + (f" {symbol}" if symbol not in ("", "°") else symbol)
 
 

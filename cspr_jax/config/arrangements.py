@@ -1,0 +1,59 @@
+"""Arrangements of the cables of a robot as an axis of sweeps; without jax."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.missing_cables import PER_CABLE
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.shapes import Float
+from cspr_jax.robots.model.arrangements import MAX_CABLES_OF_ALL, distinct_arrangements, numbers_of, symmetries_of
+
+
+def arrangement_points(
+    robot_file: RobotFile, arrangements: str | list[int] | list[list[int]], *, has_lists: bool
+) -> Float[np.ndarray, "n"]:
+    """Numbers of the arrangements of an axis; `has_lists` tells whether the sweep has limits that differ by cable.
+
+    Raises:
+        InputError: too many cables for all arrangements, or a list that is no permutation of the cables.
+    """
+    count = len(robot_file.base_points)
+    if robot_file.platform_points is None:
+        raise InputError("arrangement", arrangements, "absent: all cables of a point mass end in it")
+    if isinstance(arrangements, str):
+        if count > MAX_CABLES_OF_ALL:
+            allowed = f"a list, of robots on more than {MAX_CABLES_OF_ALL} cables"
+            raise InputError("arrangement", arrangements, allowed)
+        return distinct_arrangements(count, [] if has_lists else _symmetries(robot_file)).astype(float)
+    if not isinstance(arrangements[0], list):
+        return np.array(arrangements, float)
+    for each in arrangements:
+        if sorted(each) != list(range(count)):
+            raise InputError("arrangement", each, f"the numbers 0 to {count - 1}, each once")
+    return numbers_of(np.array(arrangements)).astype(float)
+
+
+def _symmetries(robot_file: RobotFile) -> list[Any]:
+    # None where pulleys turn about axes of their own, of which mirrors would be others.
+    if robot_file.pulley_axes is not None or robot_file.platform_points is None or robot_file.inertia is None:
+        return []
+    spec = robot_file.model_dump(exclude_none=True, include={*PER_CABLE, "winch"})
+    tables = [spec, spec.get("winch", {})]
+    lists = [
+        value
+        for table in tables
+        for name, value in table.items()
+        if isinstance(value, list) and name not in ("base_points", "platform_points")
+    ]
+    return symmetries_of(
+        np.array(robot_file.base_points),
+        np.array(robot_file.platform_points),
+        np.array(robot_file.centre_of_mass or [0.0, 0.0, 0.0]),
+        np.array(robot_file.inertia),
+        list(zip(*lists, strict=True)) if lists else [()] * len(robot_file.base_points),
+        is_planar=robot_file.is_planar,
+    )
