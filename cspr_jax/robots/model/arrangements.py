@@ -55,19 +55,19 @@ def numbers_of(arrangements: Int[np.ndarray, "m n"]) -> Int[np.ndarray, "m"]:
 
 def distinct_arrangements(count: int, symmetries: Sequence[Symmetry]) -> Int[np.ndarray, "m"]:
     """Numbers of all arrangements but those that symmetries make of one with a smaller number."""
-    every = np.array(list(itertools.permutations(range(count))))
+    permutations = np.array(list(itertools.permutations(range(count))))
     images = []
     for symmetry in symmetries:
-        image = np.empty_like(every)
-        image[:, symmetry.spools] = symmetry.attachments[every]
+        image = np.empty_like(permutations)
+        image[:, symmetry.spools] = symmetry.attachments[permutations]
         images.append(numbers_of(image))
-    smallest = np.arange(len(every))
+    smallest = np.arange(len(permutations))
     while True:
         before = smallest
         for image in images:
             smallest = np.minimum(smallest, smallest[image])
         if np.array_equal(smallest, before):
-            return np.flatnonzero(smallest == np.arange(len(every)))
+            return np.flatnonzero(smallest == np.arange(len(permutations)))
 
 
 def symmetries_of(
@@ -86,7 +86,7 @@ def symmetries_of(
     middle = spools.mean(0)
     of_spools, names = spools - middle, [groups.index(group) for group in groups]
     extent = max(np.abs(of_spools).max(), np.abs(attachments).max()) * SAME
-    found = []
+    result = []
     for turn in _turns(of_spools, extent, is_planar=is_planar):
         stays = np.abs(turn @ centre_of_mass - centre_of_mass).max() <= extent
         spread = np.abs(turn @ inertia @ turn.T - inertia).max()
@@ -94,12 +94,12 @@ def symmetries_of(
         if not stays or spread > SAME * np.abs(inertia).max() or images[0] is None or images[1] is None:
             continue
         if all(names[i] == names[j] for i, j in enumerate(images[0])):
-            found.append(Symmetry(images[0], images[1]))
+            result.append(Symmetry(images[0], images[1]))
     same = np.arange(len(spools))
-    found += [
+    result += [
         Symmetry(swap, same) for swap in _swaps(of_spools, extent) if all(names[i] == names[swap[i]] for i in same)
     ]
-    return [*found, *(Symmetry(same, swap) for swap in _swaps(attachments, extent))]
+    return [*result, *(Symmetry(same, swap) for swap in _swaps(attachments, extent))]
 
 
 def _turns(points: np.ndarray, extent: float, *, is_planar: bool) -> Iterator[np.ndarray]:
