@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from cspr_jax.numerics.shapes import Float, Int
 
@@ -121,6 +120,8 @@ def _turns(points: np.ndarray, extent: float, *, is_planar: bool) -> Iterator[np
 
 def _images(points: np.ndarray, turn: np.ndarray, extent: float) -> np.ndarray | None:
     # Points on which those of a set come to lie; None where one lies on none.
+    from scipy.optimize import linear_sum_assignment  # most files have no arrangements, and load quickly
+
     distances = np.linalg.norm((points @ turn.T)[:, None] - points, axis=2)
     rows, columns = linear_sum_assignment(distances)
     return columns if distances[rows, columns].max() <= 4.0 * extent else None
