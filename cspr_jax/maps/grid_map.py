@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,6 +26,9 @@ from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
 
 # A refined margin may lie below its proved bound by this much, due to rounding.
 CHECK_ERROR = 1e-8
+# Robot at values of its parameters, and coordinates of axes.
+RobotAt = Callable[[Mapping[str, float]], RobotFile]
+Axes = Mapping[str, np.ndarray]
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
@@ -66,6 +70,11 @@ class GridMap(abc.ABC):
                 check_no_motors(self._problem.limits)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
+
+    @classmethod
+    def over_robots(cls, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> GridMap | None:
+        """A map whose cells have robots of their own; None where each robot needs a map of its own."""
+        return None
 
     def _scene_or_none(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None without obstacles and without a shape of the platform.

@@ -2,6 +2,7 @@
 
 import functools
 import pickle
+from collections.abc import Mapping
 
 import jax
 import numpy as np
@@ -35,8 +36,8 @@ class TileMap:
         """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            # Each robot of a tile has a map of its own where axes are parameters.
-            self._one = None if robot_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
+            # Each robot of a tile has a map of its own where axes are parameters, unless a kind has robots as lanes.
+            self._one = _over_robots(sweep) if robot_axes(sweep.grid.axes) else _map_of(sweep, sweep.robot)
             if self._one is not None:
                 self._one.refuse_hopeless(sweep.grid)
 
@@ -84,6 +85,13 @@ class TileMap:
         ]  # what has no number a cell is not stored
         answers = {name: np.concatenate([part[name] for part in parts])[order] for name in names}
         return answers, None if None in counts else sum(counts)
+
+
+def _over_robots(sweep: Sweep) -> GridMap | None:
+    def robot(values: Mapping[str, float]) -> RobotFile:
+        return robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file)
+
+    return sweep.kind.load().over_robots(robot, sweep.spec, sweep.file, sweep.grid.axes)
 
 
 def _map_of(sweep: Sweep, robot_file: RobotFile) -> GridMap:

@@ -15,7 +15,7 @@ from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.maps.grid_map import Axes, GridMap, RobotAt
 from cspr_jax.motion.given_limits import static_limits
 from cspr_jax.motion.limits import are_of_motors, search_limits
 from cspr_jax.numerics.linear.frames import frame_of
@@ -34,6 +34,7 @@ from cspr_jax.workspaces.cells.speeds import CableSpeeds, cable_speeds
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.search_over_robots import RobotRows
 from cspr_jax.workspaces.static_cells import RestCells
 from cspr_jax.workspaces.static_poses import FREQUENCY, MARGINS, OrientationSet, RestPoses, over_orientations
 
@@ -213,7 +214,7 @@ class WorkspaceMap(GridMap):
             set_answers = over_orientations(self._poses, positions, self._samples, self._volume, kind)
             return set_answers | dict.fromkeys(("cell_side", "cell_open"), np.zeros(len(positions), np.int16))
         positions, quaternions = self._poses_of(cells)
-        answers = self._poses(positions, quaternions)
+        answers = self._poses(positions, quaternions, self._robots_of(cells))
         sides, reasons = np.zeros((2, len(positions)), np.int16)
         if self._cells is not None:
             answers["verdict"] = self._cells.verdicts(positions, answers["verdict"])
@@ -222,6 +223,20 @@ class WorkspaceMap(GridMap):
         inside = answers["verdict"] == 0
         answers |= {"inside": inside[:, None], "orientation_fraction": inside.astype(float)}
         return answers | {"cell_side": sides, "cell_open": reasons}
+
+    @classmethod
+    def over_robots(cls, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> WorkspaceMap | None:
+        """A map of many robots at once; see `GridMap.over_robots`."""
+        from cspr_jax.workspaces.map_over_robots import NotAffineError, WorkspacesOfRobots  # rests on this module
+
+        try:
+            return WorkspacesOfRobots(robot_at, spec, file, axes)
+        except NotAffineError:
+            return None
+
+    def _robots_of(self, cells: dict[str, np.ndarray]) -> RobotRows | None:
+        # Robots of the cells, where the map has several.
+        return None
 
     def _poses_of(self, cells: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         # Positions and quaternions of the cells of a map of poses.

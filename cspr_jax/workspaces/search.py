@@ -7,7 +7,8 @@ the null space of six to eight cables in space, by the normals to dof - 1 cables
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -71,19 +72,41 @@ class Poses(NamedTuple):
         positions: (n, 3) m.
         quaternions: (n, 4) unit quaternions, scalar first.
         wrenches: (n, dof) moments over a length, N; None: those of the requirement.
+        robots: rows of the robots of the poses, where these have several; None: one robot.
     """
 
     positions: np.ndarray
     quaternions: np.ndarray
     wrenches: np.ndarray | None
+    robots: Any = None
 
     def rows(self, index: Any) -> "Poses":
         """Poses chosen by indices, a slice or a mask (n,)."""
         wrenches = None if self.wrenches is None else self.wrenches[index]
-        return Poses(self.positions[index], self.quaternions[index], wrenches)
+        robots = None if self.robots is None else self.robots.rows(index)
+        return Poses(self.positions[index], self.quaternions[index], wrenches, robots)
 
 
 Stage = Callable[[Poses], np.ndarray]
+
+
+class Constants(NamedTuple):
+    """Numbers of a robot that kernels of margins take.
+
+    Fields:
+        robot: robot, centred, z down.
+        limits: limits of tensions, in the order of the kernel's cables.
+        wrenches: wrenches that the cables must supply, moments over a length; without points they are those of poses.
+    """
+
+    robot: AnyRobot
+    limits: kernels.TensionLimits
+    wrenches: Wrenches
+
+
+def cast(tree: Any, dtype: type) -> Any:
+    """Arrays of a tree in another type."""
+    return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
 
 
 class WorkspaceSearch:
@@ -113,8 +136,9 @@ class WorkspaceSearch:
         else:
             sizes = requirement.wrenches.magnitude, float(robot.mass * robot.gravity)
             self._boundary *= np.abs([*requirement.low, *requirement.high[np.isfinite(requirement.high)], *sizes]).max()
+        self._few, self._has_limits = FEW_TRIALS, has_limits(requirement)
         matrices = self._trials()
-        self._choices = facet_normals.choices_of(matrices[:FEW_TRIALS])
+        self._choices = facet_normals.choices_of(matrices[: self._few])
         self._order = tuple[int, ...]()
         is_few = 0 <= robot.n_cables - facet_normals.CABLES <= facet_normals.MAX_OTHERS
         if robot.dof == facet_normals.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
@@ -131,8 +155,11 @@ class WorkspaceSearch:
             return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
         quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
         loads = self._weights(positions, quaternions) if wrenches is None else wrenches / self.unit
-        poses = Poses(positions, quaternions, loads)
-        parts = in_parts(lambda part: self._part(poses.rows(part)), len(positions), PART)
+        return self.answers(Poses(positions, quaternions, loads))
+
+    def answers(self, poses: Poses) -> WorkspaceAnswers:
+        """Tell whether poses belong to the workspace."""
+        parts = in_parts(lambda part: self._part(poses.rows(part)), len(poses.positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
@@ -142,31 +169,36 @@ class WorkspaceSearch:
         return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
 
     def _trials(self) -> np.ndarray:
+        return self._trials_of(self.robot)
+
+    def _trials_of(self, robot: AnyRobot) -> np.ndarray:
         # Finite wrench matrices of sampled poses among the spools, at which no cable ends within its pulley. If pulleys
         # are large there may be such poses only farther out.
-        rng, base, row = np.random.default_rng(1), np.asarray(self.robot.base_points), PATTERNS[self.robot.pattern]
+        rng, base, row = np.random.default_rng(1), np.asarray(robot.base_points), PATTERNS[robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
         # If all spools have the same x, some components vanish only in their plane: sample outside of it.
         moves = np.isin(range(3), row.forces or range(3))
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
-        regular = np.zeros((0, self.robot.dof, self.robot.n_cables))
+        regular = np.zeros((0, robot.dof, robot.n_cables))
         for widening in range(WIDENINGS):
             positions = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
             quaternions = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
             if row.is_planar:
                 quaternions[:, [1, 3]] = 0.0
-            matrices = self._matrices(positions, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
+            matrices = self._matrices(
+                robot, positions, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+            )
             regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
             if len(regular) >= FEW_TRIALS:
                 return regular
         allowed = "must leave room for poses where no cable ends within its pulley"
         raise InputError("pulley_radius", None, allowed, problem="none among the spools, nor around them")
 
-    def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+    def _matrices(self, robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Wrench matrices with moments over the length.
         poses = positions, quaternions
-        matrices = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=TRIALS)
+        matrices = in_batches(lambda x: geometry.wrench_matrices(robot, *x), poses, batch_size=TRIALS)
         return matrices / self.unit[:, None]
 
     def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -212,28 +244,32 @@ class WorkspaceSearch:
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
         """Compiled margins of a batch of poses."""
+        constants = cast(self._constants(self.robot, self.requirement, by_null_space=by_null_space), dtype)
+        return partial(self._margins(dtype, by_null_space=by_null_space), constants)
 
-        def cast(tree):
-            return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
+    def _constants(self, robot: AnyRobot, asked: Requirement, *, by_null_space: bool) -> Constants:
+        # Numbers of a robot that kernels take; of required wrenches all but the weight of a body on a joint.
+        ordered = list(self._order) if by_null_space else slice(None)
+        limits = (as_float64(asked.low[ordered]), as_float64(asked.high[ordered]), as_float64(self._normals_unit))
+        required = asked.wrenches.over(self.unit)
+        points = [] if required.points is None else [[as_float64(x) for x in point] for point in required.points]
+        box = None if required.box is None else as_float64(required.box)
+        wrenches = Wrenches(points, box, [as_float64(x) for x in required.ellipsoids])
+        return Constants(robot, kernels.TensionLimits(*limits), wrenches)
 
+    def _margins(self, dtype: type, *, by_null_space: bool) -> Callable[..., Array]:
+        # Compiled margins of a batch of poses, from the numbers of a robot, or of the robot of each pose.
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.requirement.high).all())}
-        robot, ordered = cast(self.robot), list(self._order) if by_null_space else slice(None)
-        limits = (
-            as_float64(self.requirement.low[ordered]),
-            as_float64(self.requirement.high[ordered]),
-            as_float64(self._normals_unit),
-        )
-        tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), as_float64(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
-        choices = choices._replace(counts=cast(choices.counts))
+        choices, length = choices._replace(counts=cast(choices.counts, dtype)), cast(as_float64(self._length), dtype)
 
-        def compiled(position, quaternion, load):
-            columns, loss = geometry.wrench_columns(robot, position, quaternion, length)
-            wrenches = fixed if load is None else fixed._replace(points=[load])
+        def compiled(constants, position, quaternion, load):
+            columns, loss = geometry.wrench_columns(constants.robot, position, quaternion, length)
+            wrenches = constants.wrenches if load is None else constants.wrenches._replace(points=[load])
             if not by_null_space:
-                return kernels.by_normals(columns, loss, wrenches, tension_limits, choices, **options)
+                return kernels.by_normals(columns, loss, wrenches, constants.limits, choices, **options)
             space = kernels.null_space(columns, loss, wrenches.points[0], order=self._order)
-            return kernels.by_null_space(space, tension_limits, choices, **options)
+            return kernels.by_null_space(space, constants.limits, choices, **options)
 
         return compiled
 
@@ -247,11 +283,13 @@ class WorkspaceSearch:
             quaternions = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), quaternions, loads
-            # Use only two lengths, since code is compiled for each.
-            length = BATCH if len(poses.positions) <= MAX_SHORT * BATCH else self.batch(dtype)
-            return in_batches(lambda x: compiled(*x), batch, batch_size=length)
+            return in_batches(lambda x: compiled(*x), batch, batch_size=self._batch(poses, dtype))
 
         return stage
+
+    def _batch(self, poses: Poses, dtype: type) -> int:
+        # One of only two lengths, since code is compiled for each.
+        return BATCH if len(poses.positions) <= MAX_SHORT * BATCH else self.batch(dtype)
 
     @property
     def _relations(self) -> facet_normals.CableSubsets:
@@ -274,44 +312,39 @@ class WorkspaceSearch:
         poses = positions, quaternions
         return in_batches(lambda x: geometry.weights(self.robot, *x), poses, batch_size=BATCH) / self.unit
 
-    @property
-    def _fixed(self) -> Wrenches:
-        # Required wrenches for kernels, except the weight of a body on a joint, which depends on the pose.
-        required = self._wrenches
-        points = [] if required.points is None else [[as_float64(x) for x in point] for point in required.points]
-        return Wrenches(
-            points,
-            None if required.box is None else as_float64(required.box),
-            [as_float64(x) for x in required.ellipsoids],
-        )
-
     def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:
         # Poses at which tensions touch or slightly exceed limits, but keep the limits widened by the allowance.
-        low, high = self.requirement.low, self.requirement.high
         rows = np.flatnonzero(np.abs(margin) <= TOUCHED / BOUNDARY * self._boundary)
-        if self._measure == "closure" or not (low.any() or np.isfinite(high).any()) or not len(rows):
+        if self._measure == "closure" or not self._has_limits or not len(rows):
             return rows[:0]
-        wider = low * (1.0 - TOUCHED), high * (1.0 + TOUCHED)
-        return rows[self._exactly(poses.rows(rows), wider)[0] > FORMULAS_UNDECIDED / BOUNDARY * self._boundary]
+        return rows[self._exactly(poses.rows(rows), TOUCHED)[0] > FORMULAS_UNDECIDED / BOUNDARY * self._boundary]
 
-    def _exactly(
-        self, poses: Poses, limits: tuple[np.ndarray, np.ndarray] | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        matrices = self._matrices(poses.positions, poses.quaternions)
+    def _exactly(self, poses: Poses, widening: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         measure = self._normals_unit if self._measure == "capacity" else None
-        margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
-        for i, columns in enumerate(matrices):
+        count = len(poses.positions)
+        margins, is_outside = np.full(count, np.nan), np.zeros(count, bool)
+        for i, (columns, required, low, high) in enumerate(self._problems(poses)):
             if not np.isfinite(columns).all():
                 continue
             if self._measure == "closure":
                 margins[i] = exact.closure_margin(columns, self._choices)
                 is_outside[i] = exact.facet_normals(columns)[2].shape[1] < len(columns)
             else:
-                required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                low, high = limits or (self.requirement.low, self.requirement.high)
-                margins[i] = exact.wrench_margin(columns, required, low, high, measure)
+                wider = low * (1.0 - widening), high * (1.0 + widening)
+                margins[i] = exact.wrench_margin(columns, required, *wider, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
+
+    def _problems(self, poses: Poses) -> Iterator[tuple[np.ndarray, RequiredWrenches, np.ndarray, np.ndarray]]:
+        # Wrench matrix, required wrenches, and smallest and largest tensions at each pose.
+        for i, columns in enumerate(self._matrices(self.robot, poses.positions, poses.quaternions)):
+            required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
+            yield columns, required, self.requirement.low, self.requirement.high
+
+
+def has_limits(required: Requirement) -> bool:
+    """Tell whether tensions have limits beyond taut cables."""
+    return bool(required.low.any() or np.isfinite(required.high).any())
 
 
 def _length(robot: AnyRobot) -> float:

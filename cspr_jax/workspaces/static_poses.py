@@ -24,7 +24,8 @@ from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
 from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import CLOSURE
-from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.search import Poses, WorkspaceSearch
+from cspr_jax.workspaces.search_over_robots import RobotRows
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (
@@ -80,14 +81,22 @@ class RestPoses:
             return positions
         return positions - mass_centres(self.robot, np.zeros_like(positions), quaternions)
 
-    def __call__(self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> PoseColumns:
-        """Tell whether poses meet all conditions."""
+    def __call__(
+        self,
+        positions: Float[np.ndarray, "n 3"],
+        quaternions: Float[np.ndarray, "n 4"],
+        robots: RobotRows | None = None,
+    ) -> PoseColumns:
+        """Tell whether poses meet all conditions; `robots` are those of the poses, where the searches have several."""
         origins = self.origins(positions, quaternions)
         centres, count = mass_centres(self.robot, origins, quaternions), len(origins)
         columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
         verdict = np.zeros(count, FLAGS)
         for condition, search in self.searches.items():
-            answers = search(centres, quaternions)
+            if robots is None:
+                answers = search(centres, quaternions)
+            else:
+                answers = search.answers(Poses(centres, quaternions, None, robots))
             verdict |= answers.verdict
             name = margin_name(condition)
             columns[name] = np.fmin(columns[name], answers.margin)

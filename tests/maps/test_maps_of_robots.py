@@ -60,7 +60,11 @@ def test_maps_over_robots_are_the_maps_of_each_robot(kind):
     for i, value in enumerate(VALUES):
         alone = cspr_jax.compute_sweep(spec | {"parameters": {"size": value}})
         for name, values in alone.data_vars.items():
-            np.testing.assert_array_equal(whole[name].isel({"parameter.size": i}).values, values.values, err_msg=name)
+            part = whole[name].isel({"parameter.size": i}).values
+            if kind == "workspace" and part.dtype.kind == "f":  # robots are lanes
+                np.testing.assert_allclose(part, values.values, rtol=1e-9, err_msg=name)
+            else:
+                np.testing.assert_array_equal(part, values.values, err_msg=name)
 
 
 def test_every_kind_is_here():

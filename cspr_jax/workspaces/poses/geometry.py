@@ -1,8 +1,8 @@
 """Geometry of many poses: unit vectors of the cables, columns of the wrench matrix, weights.
 
-Arrays are (n_cables, n): one row a cable, one lane a pose. Rotated arms, unit vectors, columns and later steps are
-compiled separately: in one call XLA would compute each length three times, and loops over values that the call itself
-has stored are three times as slow as loops over its arguments.
+Arrays are (n_cables, n): one row a cable, one lane a pose. Points of robots may have a lane for each pose, too. Rotated
+arms, unit vectors, columns and later steps are compiled separately: in one call XLA would compute each length three
+times, and loops over values that the call itself has stored are three times as slow as loops over its arguments.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
     """Arms from the mass centre, or from the joint, to the attachment points."""
     if not isinstance(robot, PlatformRobot):
         return None
-    shape = robot.n_cables, len(quaternion[0])
+    shape = len(robot.base_points), len(quaternion[0])
     rotation = [[_along(x, shape) for x in row] for row in lanes.rotation_matrix(quaternion)]
     return lanes.rotated(rotation, _down(robot.platform_points, shape))
 
@@ -54,7 +54,8 @@ def _along(lane: Array, shape: tuple[int, int]) -> Array:
 
 
 def _down(points: Array, shape: tuple[int, int]) -> Vector:
-    return tuple(jnp.broadcast_to(points[:, i, None], shape) for i in range(3))
+    # Points (n_cables, 3) of one robot, or (n_cables, 3, n) of the robot of each pose.
+    return tuple(jnp.broadcast_to(points[:, i, None] if points.ndim == 2 else points[:, i], shape) for i in range(3))
 
 
 def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Array]:
@@ -64,7 +65,7 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tupl
 
 def _rays(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Vector]:
     # Attachment points of the cables, and rays from there to the base points.
-    shape = robot.n_cables, len(position[0])
+    shape = len(robot.base_points), len(position[0])
     if arms is None and isinstance(robot, PlatformRobot):
         arms = _down(robot.platform_points, shape)
     target, base = [_along(x, shape) for x in position], _down(robot.base_points, shape)
@@ -82,7 +83,7 @@ def _inverse_lengths(robot: AnyRobot, position: Vector, arms: Vector | None) -> 
 @jax.jit
 def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Array) -> tuple[Vector, Array]:
     target, ray = _rays(robot, position, arms)
-    far = maximum_of(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
+    far = maximum_of(jnp.abs(robot.base_points), axis=(0, 1)) + lanes.largest([jnp.abs(x) for x in position])
     loss = jnp.maximum(1.0, far * lanes.largest(list(inverse)))
     if robot.pulleys is None:
         return tuple(x * inverse for x in ray), loss
@@ -96,7 +97,7 @@ def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Arra
 def _columns(
     robot: PlatformRobot, units: Vector, arms: Vector | None, quaternion: Vector | None, length: Array
 ) -> list[Array]:
-    row, shape = PATTERNS[robot.pattern], (robot.n_cables, units[0].shape[1])
+    row, shape = PATTERNS[robot.pattern], (units[0].shape[0], units[0].shape[1])
     moment = lanes.cross(_down(robot.platform_points, shape) if arms is None else arms, units)
     if row.along_line:
         axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]
@@ -156,7 +157,7 @@ def length_lanes(robot: AnyRobot, position: Vector, quaternion: Vector) -> Float
     straight = jnp.sqrt(lanes.dot(ray, ray))
     if robot.pulleys is None:
         return straight
-    shape = robot.n_cables, straight.shape[1]
+    shape = straight.shape[0], straight.shape[1]
     base, axes = _down(robot.base_points, shape), _down(robot.pulleys.axes, shape)
     radius = jnp.broadcast_to(robot.pulleys.radius[:, None], shape)
     is_wheel = radius > 0.0

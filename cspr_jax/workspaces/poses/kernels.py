@@ -36,7 +36,7 @@ UNROLLED = 10
 
 
 class TensionLimits(NamedTuple):
-    """Limits of the tensions.
+    """Limits of the tensions, of one robot or, with a last dimension (n,), of the robot of each pose.
 
     Fields:
         low: (n_cables,) smallest tensions, N.
@@ -102,7 +102,7 @@ def _facet_limits(
 def _wrench_bound(wrenches: Wrenches) -> Array:
     # Upper bound of the norm of a wrench.
     parts = [one_norm(point) for point in wrenches.points]
-    spreads = [jnp.sum(axes) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
+    spreads = [jnp.sum(axes, axis=0) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
     return sum(spreads, largest(parts))
 
 
@@ -127,7 +127,7 @@ def _smallest_margin(
 
     largest_one = jnp.inf * jnp.ones_like(template)
     if measure == "tensions":  # margins are at most half of a cable's range
-        largest_one = jnp.minimum(largest_one, 0.5 * minimum_of(tension_limits.high - tension_limits.low))
+        largest_one = jnp.minimum(largest_one, 0.5 * minimum_of(tension_limits.high - tension_limits.low, axis=0))
     count = len(table)
     start = lax.complex(largest_one, largest_one)
     return lax.scan(step, start, (table, limits), unroll=count if count <= UNROLLED else 1)[0]
@@ -199,7 +199,7 @@ def by_null_space(
     """Margins of poses from the relations among rows of the null space."""
     template = space.loss
     finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
-    tension_bound = jnp.sum(finite) + space.largest
+    tension_bound = jnp.sum(finite, axis=0) + space.largest
 
     def facet(row, limits):
         rows = [[_row(part, k) for part in space.rows] for k in row]

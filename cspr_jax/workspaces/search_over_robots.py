@@ -1,0 +1,242 @@
+"""Margins of poses of many robots at once, whose numbers are affine in parameters and whose cables are rearranged.
+
+Each pose has a robot of its own. Kernels take the numbers in which robots differ lane by lane, like positions, so that
+batches are full whatever the number of poses of each robot, and are compiled once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.shapes import Float
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.kernels import TensionLimits
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+from cspr_jax.workspaces.requirements import Requirement
+from cspr_jax.workspaces.search import BATCH, Constants, Poses, Stage, WorkspaceSearch, cast, has_limits
+
+# Numbers count as equal, and as affine, up to this fraction of the largest of their array.
+EQUAL, AFFINE = 1e-14, 1e-11
+
+
+class RobotRows(NamedTuple):
+    """Robots of n poses.
+
+    Fields:
+        values: (n, k) values of the parameters.
+        attachments: (n, n_cables) attachment point of each cable; None: in their order.
+    """
+
+    values: np.ndarray
+    attachments: np.ndarray | None
+
+    def rows(self, index: Any) -> RobotRows:
+        """Robots of poses chosen by indices, a slice or a mask (n,)."""
+        return RobotRows(self.values[index], None if self.attachments is None else self.attachments[index])
+
+
+class Samples(NamedTuple):
+    """Robots from which the others follow: the first, one in which each parameter differs, one in which all do.
+
+    Fields:
+        robots: robots, centred as the first is, z down.
+        requirements: requirement of each.
+        values: (k + 2, k) their values of the parameters.
+        attachments: (m, n_cables) some arrangements of the cables; None: one.
+    """
+
+    robots: Sequence[AnyRobot]
+    requirements: Sequence[Requirement]
+    values: np.ndarray
+    attachments: np.ndarray | None
+
+
+class NotAffineError(Exception):
+    """Numbers of the robots are no affine functions of the parameters, or robots differ in more than numbers."""
+
+
+class AffineConstants(NamedTuple):
+    """Numbers that kernels take, as affine functions of parameters.
+
+    Fields:
+        first: numbers of the first robot.
+        start: (k,) its values of the parameters.
+        derivatives: for each leaf of `first`, derivatives (k, ...) by the parameters; None: equal for all robots.
+    """
+
+    first: Constants
+    start: np.ndarray
+    derivatives: tuple[np.ndarray | None, ...]
+
+
+def affine_constants(samples: Sequence[Constants], values: Float[np.ndarray, "s k"]) -> AffineConstants:
+    """Affine functions through samples, checked at the last one."""
+    leaves, trees = zip(*(jax.tree.flatten(sample) for sample in samples), strict=True)
+    if any(tree != trees[0] for tree in trees):
+        raise NotAffineError
+    derivatives = tuple(_derivatives([np.asarray(x) for x in leaf], values) for leaf in zip(*leaves, strict=True))
+    return AffineConstants(samples[0], values[0], derivatives)
+
+
+def _derivatives(samples: Sequence[np.ndarray], values: np.ndarray) -> np.ndarray | None:
+    if any(sample.shape != samples[0].shape for sample in samples):
+        raise NotAffineError
+    finite = np.isfinite(samples[0])
+    if any(not np.array_equal(sample[~finite], samples[0][~finite], equal_nan=True) for sample in samples):
+        raise NotAffineError
+    numbers = [np.where(finite, sample, 0.0) for sample in samples]
+    magnitude = max(np.abs(x).max(initial=0.0) for x in numbers)
+    changes = [x - numbers[0] for x in numbers[1:]]
+    if all(np.abs(change).max(initial=0.0) <= EQUAL * magnitude for change in changes):
+        return None
+    steps = np.diagonal(values[1:] - values[0])
+    derivatives = np.stack([change / step for change, step in zip(changes[:-1], steps, strict=True)])
+    expected = numbers[0] + np.tensordot(values[-1] - values[0], derivatives, 1)
+    if np.abs(expected - numbers[-1]).max(initial=0.0) > AFFINE * magnitude:
+        raise NotAffineError
+    return derivatives
+
+
+@jax.jit
+def constants_of_lanes(
+    family: AffineConstants, values: Sequence[Array], attachments: Sequence[Array] | None
+) -> Constants:
+    """Numbers of the robot of each lane: those in which robots differ have a last dimension."""
+    leaves, tree = jax.tree.flatten(family.first)
+    changes = [value - start for value, start in zip(values, family.start, strict=True)]
+    moved = [
+        leaf if each is None else _affine(leaf, each, changes)
+        for leaf, each in zip(leaves, family.derivatives, strict=True)
+    ]
+    constants: Constants = jax.tree.unflatten(tree, moved)
+    low, high, measure = constants.limits
+    if low.ndim != high.ndim:
+        low, high = (x if x.ndim == 2 else x[:, None] for x in (low, high))
+        constants = constants._replace(limits=TensionLimits(low, high, measure))
+    if attachments is None:
+        return constants
+    robot: Any = constants.robot
+    points, chosen = robot.platform_points, jnp.stack(attachments)
+    if points.ndim == 2:
+        points = jnp.moveaxis(points[chosen], 1, 2)
+    else:
+        points = jnp.take_along_axis(points, chosen[:, None], axis=0)
+    return constants._replace(robot=dataclasses.replace(robot, platform_points=points))
+
+
+def _affine(leaf: Array, derivatives: Any, changes: Sequence[Array]) -> Array:
+    value = jnp.broadcast_to(leaf[..., None], (*leaf.shape, len(changes[0])))
+    for derivative, change in zip(derivatives, changes, strict=True):
+        value = value + derivative[..., None] * change.reshape((1,) * leaf.ndim + change.shape)
+    return value
+
+
+class SearchOverRobots(WorkspaceSearch):
+    """Search for poses of many robots that meet a requirement; see `WorkspaceSearch`. `answers` takes the poses.
+
+    Raises:
+        NotAffineError: the robots cannot be computed together.
+    """
+
+    def __init__(self, samples: Samples) -> None:
+        """Prepare the search from samples of the robots."""
+        self._samples = samples._replace(robots=[_without_words(robot) for robot in samples.robots])
+        super().__init__(self._samples.robots[0], samples.requirements[0])
+        pairs = list(zip(self._samples.robots, samples.requirements, strict=True))
+        self._boundary *= max(map(_largest, pairs)) / _largest(pairs[0])
+        row = PATTERNS[self.robot.pattern]
+        # A facet normal that some robots lack would be missed in others: all samples must have all of them.
+        is_full = len(self._choices.table) == math.comb(self.robot.n_cables, self.robot.dof - 1)
+        if row.along_line or row.is_jointed or self.robot.pulleys is not None or not is_full:
+            raise NotAffineError
+        self._choices = self._choices._replace(counts=None)
+        self._has_limits = any(map(has_limits, samples.requirements))
+        self._families = {
+            by_null_space: affine_constants(
+                [self._constants(*pair, by_null_space=by_null_space) for pair in pairs], samples.values
+            )
+            for by_null_space in (False, *([True] if self._order else []))
+        }
+
+    def _trials(self) -> np.ndarray:
+        # Matrices of all samples in turn, so that what is left out is left out of all robots.
+        robots: list[Any] = list(self._samples.robots)
+        for each in () if self._samples.attachments is None else self._samples.attachments:
+            robots.append(dataclasses.replace(robots[0], platform_points=np.asarray(robots[0].platform_points)[each]))
+        parts = [self._trials_of(robot) for robot in robots]
+        self._few = max(self._few, len(parts))
+        count = min(map(len, parts))
+        return np.stack([part[:count] for part in parts], axis=1).reshape(-1, *parts[0].shape[1:])
+
+    def _stage(self, dtype: type, by_null_space: bool) -> Stage:
+        margins = self._margins(dtype, by_null_space=by_null_space)
+        family = cast(self._families[by_null_space], dtype)
+
+        def compiled(batch: Any) -> Array:
+            (positions, quaternions), robots = batch
+            return margins(constants_of_lanes(family, *robots), positions, quaternions, None)
+
+        def stage(poses: Poses) -> np.ndarray:
+            return in_batches(compiled, self._lanes(poses, dtype), batch_size=self._batch(poses, dtype))
+
+        return stage
+
+    def _lanes(self, poses: Poses, dtype: type) -> Any:
+        def lanes(array: np.ndarray, kind: type) -> tuple[np.ndarray, ...]:
+            return tuple(np.ascontiguousarray(column, kind) for column in array.T)
+
+        quaternions = lanes(poses.quaternions, dtype) if PATTERNS[self.robot.pattern].is_body else None
+        values, attachments = poses.robots
+        chosen = None if attachments is None else lanes(attachments, np.int32)
+        return (lanes(poses.positions, dtype), quaternions), (lanes(values, dtype), chosen)
+
+    def _problems(self, poses: Poses) -> Iterator[tuple[np.ndarray, RequiredWrenches, np.ndarray, np.ndarray]]:
+        lanes = self._lanes(poses, np.float64)
+        length = as_float64(self._length)
+        family = self._families[False]
+        columns, constants = in_batches(
+            lambda batch: _matrices(family, batch, length), lanes, batch_size=BATCH, axis=-1
+        )
+        for i in range(len(poses.positions)):
+            (low, high, _), (points, box, ellipsoids) = jax.tree.map(lambda x, i=i: x[..., i], constants)
+            yield columns[..., i], RequiredWrenches(np.array(points), box, tuple(ellipsoids)), low, high
+
+
+def _matrices(family: AffineConstants, batch: Any, length: Array) -> Any:
+    (positions, quaternions), robots = batch
+    constants = constants_of_lanes(family, *robots)
+    columns, _ = geometry.wrench_columns(constants.robot, positions, quaternions, length)
+    shape = positions[0].shape
+
+    def of_lanes(leaf: Array, first: Array) -> Array:
+        return jnp.broadcast_to(leaf if leaf.ndim > np.ndim(first) else leaf[..., None], np.shape(first) + shape)
+
+    numbers, first = (constants.limits, constants.wrenches), (family.first.limits, family.first.wrenches)
+    return jnp.stack(columns), jax.tree.map(of_lanes, numbers, first)
+
+
+def _largest(pair: tuple[AnyRobot, Requirement]) -> float:
+    # The largest of the limits and of the required wrenches, N.
+    robot, asked = pair
+    sizes = asked.wrenches.magnitude, float(robot.mass * robot.gravity)
+    return float(np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max())
+
+
+def _without_words(robot: AnyRobot) -> AnyRobot:
+    # Without name, and without the record of attachment points that fall together, which differ between robots.
+    if isinstance(robot, PlatformRobot):
+        return dataclasses.replace(robot, name="", joints=tuple(range(robot.n_cables)))
+    return dataclasses.replace(robot, name="")

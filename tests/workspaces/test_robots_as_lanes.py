@@ -1,0 +1,204 @@
+"""Workspaces of many robots at once, beside those of each robot, and beside linear programs."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import cspr_jax
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.robots.model.arrangements import arrangement_of
+from cspr_jax.workspaces import map as workspace_map
+from cspr_jax.workspaces.search_over_robots import SearchOverRobots
+
+EIGHT = resolve_robot("cogiro-500", "test", Path()).model_dump(mode="json", exclude_none=True)
+MOVES = [
+    {"name": "size", "value": 1, "lower": 0.5, "upper": 2, "moves": {"scale": 1}},
+    {"name": "load", "value": 0, "lower": -100, "upper": 400, "unit": "kg", "moves": {"mass": 1}},
+    {
+        "name": "lift",
+        "value": 0,
+        "lower": -1,
+        "upper": 1,
+        "moves": {"base_points[0][2]": 1, "platform_points[1][0]": 0.2},
+    },
+    {"name": "strength", "value": 0, "lower": -2000, "upper": 3000, "moves": {"tension_max": 1}},
+]
+PLANAR = {
+    "name": "planar",
+    "pattern": "1R2T",
+    "mass": 5.0,
+    "base_points": [[-2, 0, 0], [-1.7, 0, 0.1], [1.6, 0, 0], [2, 0, 0.2]],
+    "platform_points": [[-0.3, 0, 0], [-0.1, 0, 0.2], [0.1, 0, 0.25], [0.3, 0, 0]],
+    "inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "tension_min": 1.0,
+    "tension_max": 300.0,
+    "parameter": [
+        {"name": "size", "value": 1, "lower": 0.5, "upper": 2, "moves": {"scale": 1, "tension_min": 0.5}},
+        {"name": "load", "value": 0, "lower": -1, "upper": 4, "moves": {"mass": 1}},
+    ],
+}
+POINT = {
+    "name": "point",
+    "mass": 3.0,
+    "base_points": [[1, 1, 0], [-1, 1, 0.1], [-1, -1, 0], [1, -1, -0.1]],
+    "tension_max": [60.0, 70.0, 80.0, 90.0],
+    "parameter": [
+        *PLANAR["parameter"][1:],
+        {"name": "size", "value": 1, "lower": 0.5, "upper": 2, "moves": {"scale": 1}},
+    ],
+}
+X, Y, Z = [-3.0, -0.4, 0.0, 2.5], [-2.0, 0.0, 1.1], [0.5, 2.0]
+CASES = {
+    "eight cables": (EIGHT | {"parameter": MOVES}, {"x": X, "y": Y, "z": Z}, {"conditions": ["wrench-feasible"]}),
+    "seven cables": (
+        {name: value[:7] if name.endswith("_points") else value for name, value in EIGHT.items()}
+        | {"parameter": MOVES},
+        {"x": X, "y": Y, "z": Z, "tilt": [0.0, 0.2]},
+        {"conditions": ["static", "wrench-feasible"], "acceleration": 0.4, "wrench_box": [10, 20, 30, 1, 2, 3]},
+    ),
+    "in a plane": (
+        PLANAR,
+        {"x": [-1.0, 0.0, 0.3], "y": [0.0], "z": [0.7, 1.5], "tilt": [-0.1, 0.0]},
+        {"conditions": ["wrench-feasible"], "wrenches": [[0, -60, 0], [5, -40, 1]]},
+    ),
+    "closure": (
+        PLANAR | {"base_points": [[-2, 0, 0], [2, 0, 0.1], [-1.9, 0, 2], [2, 0, 2.1]]},
+        {"x": [-1.0, 0.0, 0.3], "y": [0.0], "z": [0.7, 1.5], "tilt": [-1.1, 0.0]},
+        {"conditions": ["wrench-closure"]},
+    ),
+    "point mass": (POINT, {"x": [-1.2, 0, 0.4], "y": [0, 0.5], "z": [0.2, 0.9]}, {"conditions": ["wrench-feasible"]}),
+}
+VALUES = {"size": [0.9, 1.3], "load": [-0.5, 2.0], "lift": [-0.4, 0.3], "strength": [-1500.0, 800.0]}
+
+
+def _spec(case, **axes):
+    robot, targets, workspace = CASES[case]
+    names = [table["name"] for table in robot["parameter"]]
+    of_robot = {f"parameter.{name}": VALUES[name] for name in names} | axes
+    return {"schema": 1, "map": "workspace", "robot": robot, "axes": of_robot | targets, "workspace": workspace}
+
+
+def _counted(monkeypatch):
+    """How often robots were lanes."""
+    seen = []
+    whole = SearchOverRobots.answers
+
+    def answers(self, poses):
+        seen.append(len(poses.positions))
+        return whole(self, poses)
+
+    monkeypatch.setattr(SearchOverRobots, "answers", answers)
+    return seen
+
+
+def _one_by_one(monkeypatch, spec):
+    with monkeypatch.context() as patched:
+        patched.setattr(workspace_map.WorkspaceMap, "over_robots", classmethod(lambda *_: None))
+        return cspr_jax.compute_sweep(spec)
+
+
+@pytest.mark.quick("in a plane", "point mass")
+@pytest.mark.parametrize("case", CASES)
+def test_robots_as_lanes_have_the_workspaces_of_each(monkeypatch, case):
+    spec, seen = _spec(case), _counted(monkeypatch)
+    together = cspr_jax.compute_sweep(spec)
+    assert sum(seen) == together.verdict.size * len(spec["workspace"]["conditions"])
+    alone = _one_by_one(monkeypatch, spec)
+    assert sum(seen) == together.verdict.size * len(spec["workspace"]["conditions"])
+    assert set(together.data_vars) == set(alone.data_vars)
+    for name, values in alone.data_vars.items():
+        if values.dtype.kind == "f":
+            scale = np.abs(values.values[np.isfinite(values.values)]).max(initial=1.0)
+            np.testing.assert_allclose(together[name].values, values.values, atol=1e-11 * scale, rtol=0.0)
+        else:
+            np.testing.assert_array_equal(together[name].values, values.values)
+    assert 0 < (alone.verdict == 0).sum() < alone.verdict.size
+
+
+def _best_margin(base, centre, arms, mass, low, high):
+    """Largest s with tensions s inside of their limits that hold the weight, by a linear program; z up."""
+    attached = centre + arms
+    units = base - attached
+    units /= np.linalg.norm(units, axis=1, keepdims=True)
+    wrench = np.concatenate([units, np.cross(arms, units)], axis=1).T
+    count = len(base)
+    goal = np.array([0, 0, mass * 9.81, 0, 0, 0])
+    rows = np.block([[-np.eye(count), np.ones((count, 1))], [np.eye(count), np.ones((count, 1))]])
+    limits = np.concatenate([-low * np.ones(count), high * np.ones(count)])
+    equal = np.c_[wrench, np.zeros(6)]
+    done = linprog(np.r_[np.zeros(count), -1.0], rows, limits, equal, goal, bounds=[(None, None)] * (count + 1))
+    return -done.fun if done.status == 0 else np.nan
+
+
+def test_arrangements_beside_linear_programs(monkeypatch):
+    """Of random arrangements of cables, at random poses, with no rotation."""
+    rng, seen = np.random.default_rng(5), _counted(monkeypatch)
+    numbers = rng.integers(0, 40320, 12).tolist()
+    axes = {"x": [-3.1, 0.7], "y": [1.3], "z": [0.6, 2.1], "arrangement": numbers}
+    spec = {"schema": 1, "map": "workspace", "robot": EIGHT, "axes": axes}
+    result = cspr_jax.compute_sweep(spec | {"workspace": {"conditions": ["wrench-feasible"], "point": "mass-centre"}})
+    assert sum(seen) == result.verdict.size
+    base, points = np.array(EIGHT["base_points"]), np.array(EIGHT["platform_points"])
+    for i, number in enumerate(numbers):
+        arms = points[arrangement_of(number, 8)] - np.array(EIGHT["centre_of_mass"])
+        for j, x in enumerate(axes["x"]):
+            for k, z in enumerate(axes["z"]):
+                expected = _best_margin(base, np.array([x, 1.3, z]), arms, EIGHT["mass"], 100.0, 5000.0)
+                found = float(result.wrench_margin.values[j, 0, k, i])
+                np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_poses_that_kernels_leave_open_are_those_of_each_robot(monkeypatch):
+    """In the plane of the spools, where the wrench matrix is singular, and where a limit is touched."""
+    robot = POINT | {"base_points": [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], "tension_max": 50.0}
+    robot |= {"parameter": [robot["parameter"][0]]}
+    axes = {"parameter.load": [-0.5, 1.0, 2.0], "x": [0.0, 0.3], "y": [0.0], "z": [0.0, 0.5]}
+    spec = {
+        "schema": 1,
+        "map": "workspace",
+        "robot": robot,
+        "axes": axes,
+        "workspace": {"conditions": ["wrench-feasible"]},
+    }
+    seen = _counted(monkeypatch)
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    assert sum(seen) == together.verdict.size
+    np.testing.assert_array_equal(together.verdict, alone.verdict)
+    np.testing.assert_allclose(together.wrench_margin, alone.wrench_margin, rtol=1e-9)
+    assert len(np.unique(together.verdict)) > 1
+
+
+@pytest.mark.parametrize(
+    ("more", "workspace"),
+    [
+        ({}, {"conditions": ["wrench-feasible", "interference-free"]}),
+        ({"cable_length_max": 5.0}, {"conditions": ["wrench-feasible"]}),
+        ({"pulley_radius": 0.05}, {"conditions": ["wrench-feasible"]}),
+    ],
+)
+def test_other_robots_and_conditions_are_computed_one_by_one(monkeypatch, more, workspace):
+    spec = _spec("in a plane")
+    spec |= {"robot": json.loads(json.dumps(PLANAR | more)), "workspace": workspace}
+    spec["axes"] = {name: points for name, points in spec["axes"].items() if name != "tilt"}
+    if "cable_length_max" not in more and "interference-free" in workspace["conditions"]:
+        spec["robot"]["cable_diameter"] = 0.01
+    seen = _counted(monkeypatch)
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    assert not seen
+    for name, values in alone.data_vars.items():
+        np.testing.assert_array_equal(together[name].values, values.values)
+
+
+def test_robots_whose_matrices_lack_facets_are_computed_one_by_one(monkeypatch):
+    """Four of eight cables at one point have no facet normal with a fifth; in another arrangement others have none."""
+    points = [*EIGHT["platform_points"][:4], *[EIGHT["platform_points"][4]] * 4]
+    spec = _spec("eight cables")
+    spec |= {"robot": EIGHT | {"platform_points": points, "parameter": MOVES[:1]}}
+    spec["axes"] = {"parameter.size": [0.9, 1.2], "x": [0.3], "y": [0.2], "z": [1.0]}
+    seen = _counted(monkeypatch)
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    assert not seen
+    np.testing.assert_array_equal(together.wrench_margin, alone.wrench_margin)
