@@ -40,6 +40,11 @@ class Image(NamedTuple):
 IMAGES = {
     "minimum_arcs": Image("Smallest number of arcs at six heights; P0 and the start are marked at their own.", 20),
     "spool_triangle": Image("Smallest number of arcs on triangles of spools of six sizes.", 30, "--best z0"),
+    "cogiro_arrangements": Image(
+        "Share of 1,000 poses that CoGiRo holds with 500 kg in each of the 40,320 arrangements of its cables.",
+        60,
+        command="draw",
+    ),
     "poses": Image(
         "Smallest number of arcs from rest to poses of a rigid platform, tilted by 46° in four directions.",
         40,

@@ -32,6 +32,10 @@ Axes = Mapping[str, np.ndarray]
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
+class RobotsApartError(Exception):
+    """Robots cannot be computed together: each needs a map of its own."""
+
+
 class GridMap(abc.ABC):
     """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
@@ -70,11 +74,6 @@ class GridMap(abc.ABC):
                 check_no_motors(self._problem.limits)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
-
-    @classmethod
-    def over_robots(cls, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> GridMap | None:
-        """A map whose cells have robots of their own; None where each robot needs a map of its own."""
-        return None
 
     def _scene_or_none(self, robot_file: RobotFile) -> Any:
         # Return the scene of the sweep; None without obstacles and without a shape of the platform.

@@ -38,6 +38,7 @@ class MapKind:
         title: title of its results.
         description: a phrase for the reference.
         implementation: "module:Class" of its `maps.grid_map.GridMap`.
+        over_robots: the same of one for many robots at once; empty: each robot needs a map of its own.
         quantities: its quantities, all of them rows of `schema.quantities.QUANTITIES`.
         stored: quantities that are stored by default.
         stored_with: for some keys, quantities that are stored in addition if the key is given. So a key that is newer
@@ -83,6 +84,7 @@ class MapKind:
     limits: tuple[str, ...] = ()
     definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
     is_over_orientations: bool = False
+    over_robots: str = ""
     cells: int = LARGEST_TILE
     cost: CellCost = ORDINARY_COST
     patterns: tuple[str, ...] = ()
@@ -113,8 +115,16 @@ class MapKind:
 
     def load(self) -> Any:
         """Import the class that computes this kind of map."""
-        module, _, name = self.implementation.partition(":")
-        return getattr(importlib.import_module(module), name)
+        return _imported(self.implementation)
+
+    def load_over_robots(self) -> Any:
+        """Import the class that computes maps of many robots at once; None: there is none."""
+        return _imported(self.over_robots) if self.over_robots else None
+
+
+def _imported(implementation: str) -> Any:
+    module, _, name = implementation.partition(":")
+    return getattr(importlib.import_module(module), name)
 
 
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
@@ -390,6 +400,7 @@ _KINDS: dict[str, MapKind] = {
             title="Workspace",
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.workspaces.map:WorkspaceMap",
+            over_robots="cspr_jax.workspaces.map_over_robots:WorkspacesOfRobots",
             cost=CellCost(seconds=2e-6, limits=0.0, uncertainty=0.0),
             quantities=columns.WORKSPACE_QUANTITIES,
             stored=columns.WORKSPACES_STORED,

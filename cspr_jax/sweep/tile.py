@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.config.missing_cables import ANY_ONE
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ResourceError, SelfCheckError
-from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.maps.grid_map import GridMap, RobotsApartError
 from cspr_jax.numerics.batches import in_threads, short_batches
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
@@ -91,7 +91,11 @@ def _over_robots(sweep: Sweep) -> GridMap | None:
     def robot(values: Mapping[str, float]) -> RobotFile:
         return robot_at(sweep.robot, sweep.spec, sweep.kind, values, sweep.file)
 
-    return sweep.kind.load().over_robots(robot, sweep.spec, sweep.file, sweep.grid.axes)
+    make = sweep.kind.load_over_robots()
+    try:
+        return None if make is None else make(robot, sweep.spec, sweep.file, sweep.grid.axes)
+    except RobotsApartError:
+        return None
 
 
 def _map_of(sweep: Sweep, robot_file: RobotFile) -> GridMap:

@@ -15,6 +15,7 @@ Files, each importing only from those above it:
     poses                 margins of poses, one by one and compiled
     requirements          conditions with their limits and wrenches
     search                margins and verdicts of many poses
+    search_over_robots    margins and verdicts of poses of many robots
     cells                 proofs of full cells
     all_robots            requirements of all robots within an uncertainty
     clearances            clearances of robots at rest
@@ -23,6 +24,7 @@ Files, each importing only from those above it:
     acceleration_search   feasible accelerations at many positions
     sensitivities         sensitivities to errors of the cable lengths
     map                   maps of workspaces
+    map_over_robots       maps of workspaces of many robots at once
     any_cable_gone        maps of what is left of a workspace when any one cable is gone
     accelerations_map     maps of feasible accelerations
     sensitivity_map       maps of sensitivities

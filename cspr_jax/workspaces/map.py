@@ -15,10 +15,10 @@ from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.maps.grid_map import Axes, GridMap, RobotAt
+from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.motion.given_limits import static_limits
 from cspr_jax.motion.limits import are_of_motors, search_limits
-from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.linear.frames import Frame, frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot
@@ -176,6 +176,10 @@ class WorkspaceMap(GridMap):
             )
         return AllRobots(float(uncertainty.spool_positions), searches)
 
+    def sample(self) -> tuple[AnyRobot, Frame, dict[str, Requirement]]:
+        """Robot, axes, and requirements of the conditions on the cables."""
+        return self._robot, self._frame, {name: search.requirement for name, search in self._poses.searches.items()}
+
     def _condition(self, name: str, robot: AnyRobot, capacity_length: float | None = None) -> Requirement:
         # Requirement of a condition on a robot.
         loads = None
@@ -223,16 +227,6 @@ class WorkspaceMap(GridMap):
         inside = answers["verdict"] == 0
         answers |= {"inside": inside[:, None], "orientation_fraction": inside.astype(float)}
         return answers | {"cell_side": sides, "cell_open": reasons}
-
-    @classmethod
-    def over_robots(cls, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> WorkspaceMap | None:
-        """A map of many robots at once; see `GridMap.over_robots`."""
-        from cspr_jax.workspaces.map_over_robots import NotAffineError, WorkspacesOfRobots  # rests on this module
-
-        try:
-            return WorkspacesOfRobots(robot_at, spec, file, axes)
-        except NotAffineError:
-            return None
 
     def _robots_of(self, cells: dict[str, np.ndarray]) -> RobotRows | None:
         # Robots of the cells, where the map has several.

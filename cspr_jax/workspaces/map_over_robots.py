@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.maps.grid_map import Axes, RobotAt
+from cspr_jax.maps.grid_map import Axes, RobotAt, RobotsApartError
 from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.arrangements import arrangement_of
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.quantities import ARRANGEMENT, is_of_robot, parameter_values
 from cspr_jax.workspaces.map import WorkspaceMap
-from cspr_jax.workspaces.search_over_robots import NotAffineError, RobotRows, Samples, SearchOverRobots
+from cspr_jax.workspaces.search_over_robots import RobotRows, RobotSamples, SearchOverRobots
 
 # Number of arrangements from which the structure of wrench matrices is taken.
 TRIED = 6
@@ -25,7 +26,7 @@ class WorkspacesOfRobots(WorkspaceMap):
     """Workspaces of many robots, each pose with a robot of its own; see `WorkspaceMap`.
 
     Raises:
-        NotAffineError: conditions or robots are not such that they can be computed together.
+        RobotsApartError: conditions or robots are not such that they can be computed together.
     """
 
     def __init__(self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> None:
@@ -38,8 +39,9 @@ class WorkspacesOfRobots(WorkspaceMap):
         super().__init__(robot_at(parameter_values(first)), spec, file)
         self._numbers = np.sort(axes[ARRANGEMENT]) if ARRANGEMENT in axes else None
         self._refuse_others(spec)
-        maps = [self, *(WorkspaceMap(robot_at(parameter_values(each)), spec, file) for each in values[1:])]
-        robots = [self._beside(one) for one in maps]
+        others = [WorkspaceMap(robot_at(parameter_values(each)), spec, file).sample() for each in values[1:]]
+        samples = [self.sample(), *others]
+        robots = [self._beside(robot, frame) for robot, frame, _ in samples]
         count = self._robot.n_cables
         numbers = np.zeros(0) if self._numbers is None else self._numbers
         self._arrangements = np.array([arrangement_of(int(number), count) for number in numbers], np.int32)
@@ -47,8 +49,8 @@ class WorkspacesOfRobots(WorkspaceMap):
         table = np.array([[each[name] for name in self._names] for each in values])
         searches = {}
         for name in self._poses.searches:
-            requirements = [one._condition(name, one._robot) for one in maps]
-            searches[name] = SearchOverRobots(Samples(robots, requirements, table, tried))
+            requirements = [required[name] for *_, required in samples]
+            searches[name] = SearchOverRobots(RobotSamples(robots, requirements, table, tried))
         self._poses = dataclasses.replace(self._poses, searches=searches)
 
     def _refuse_others(self, spec: SweepFile) -> None:
@@ -56,16 +58,15 @@ class WorkspacesOfRobots(WorkspaceMap):
         others = (poses.around, poses.speeds, poses.capacity, limits.floor, limits.cable_length_max)
         is_apart = any(other is not None for other in (*others, spec.without, self._cells, self._samples))
         if is_apart or poses.elastic or (self._numbers is not None and not isinstance(self._robot, PlatformRobot)):
-            raise NotAffineError
+            raise RobotsApartError
 
-    def _beside(self, other: WorkspaceMap) -> AnyRobot:
-        # Another robot in the axes of the first one.
-        robot = other._robot
-        base = self._frame.inward(other._frame.outward(np.asarray(robot.base_points)))
+    def _beside(self, robot: AnyRobot, frame: Frame) -> AnyRobot:
+        # A robot in the axes of the first one.
+        base = self._frame.inward(frame.outward(np.asarray(robot.base_points)))
         is_moved = not np.allclose(base, robot.base_points, rtol=0.0, atol=1e-12 * np.abs(base).max())
         centres: list[Any] = [getattr(one, "centre_of_mass", None) for one in (robot, self._robot)]
         if (is_moved and "radius" in self._keys.axes.model_fields_set) or not np.array_equal(*centres):
-            raise NotAffineError
+            raise RobotsApartError
         return dataclasses.replace(robot, base_points=as_float64(base))
 
     def _robots_of(self, cells: dict[str, np.ndarray]) -> RobotRows:

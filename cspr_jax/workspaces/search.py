@@ -247,11 +247,11 @@ class WorkspaceSearch:
         constants = cast(self._constants(self.robot, self.requirement, by_null_space=by_null_space), dtype)
         return partial(self._margins(dtype, by_null_space=by_null_space), constants)
 
-    def _constants(self, robot: AnyRobot, asked: Requirement, *, by_null_space: bool) -> Constants:
+    def _constants(self, robot: AnyRobot, demanded: Requirement, *, by_null_space: bool) -> Constants:
         # Numbers of a robot that kernels take; of required wrenches all but the weight of a body on a joint.
         ordered = list(self._order) if by_null_space else slice(None)
-        limits = (as_float64(asked.low[ordered]), as_float64(asked.high[ordered]), as_float64(self._normals_unit))
-        required = asked.wrenches.over(self.unit)
+        limits = (as_float64(demanded.low[ordered]), as_float64(demanded.high[ordered]), as_float64(self._normals_unit))
+        required = demanded.wrenches.over(self.unit)
         points = [] if required.points is None else [[as_float64(x) for x in point] for point in required.points]
         box = None if required.box is None else as_float64(required.box)
         wrenches = Wrenches(points, box, [as_float64(x) for x in required.ellipsoids])

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.maps.grid_map import RobotsApartError
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
@@ -48,7 +49,7 @@ class RobotRows(NamedTuple):
         return RobotRows(self.values[index], None if self.attachments is None else self.attachments[index])
 
 
-class Samples(NamedTuple):
+class RobotSamples(NamedTuple):
     """Robots from which the others follow: the first, one in which each parameter differs, one in which all do.
 
     Fields:
@@ -62,10 +63,6 @@ class Samples(NamedTuple):
     requirements: Sequence[Requirement]
     values: np.ndarray
     attachments: np.ndarray | None
-
-
-class NotAffineError(Exception):
-    """Numbers of the robots are no affine functions of the parameters, or robots differ in more than numbers."""
 
 
 class AffineConstants(NamedTuple):
@@ -86,17 +83,17 @@ def affine_constants(samples: Sequence[Constants], values: Float[np.ndarray, "s 
     """Affine functions through samples, checked at the last one."""
     leaves, trees = zip(*(jax.tree.flatten(sample) for sample in samples), strict=True)
     if any(tree != trees[0] for tree in trees):
-        raise NotAffineError
-    derivatives = tuple(_derivatives([np.asarray(x) for x in leaf], values) for leaf in zip(*leaves, strict=True))
+        raise RobotsApartError
+    derivatives = tuple(_derivatives([np.asarray(x) for x in array], values) for array in zip(*leaves, strict=True))
     return AffineConstants(samples[0], values[0], derivatives)
 
 
 def _derivatives(samples: Sequence[np.ndarray], values: np.ndarray) -> np.ndarray | None:
     if any(sample.shape != samples[0].shape for sample in samples):
-        raise NotAffineError
+        raise RobotsApartError
     finite = np.isfinite(samples[0])
     if any(not np.array_equal(sample[~finite], samples[0][~finite], equal_nan=True) for sample in samples):
-        raise NotAffineError
+        raise RobotsApartError
     numbers = [np.where(finite, sample, 0.0) for sample in samples]
     magnitude = max(np.abs(x).max(initial=0.0) for x in numbers)
     changes = [x - numbers[0] for x in numbers[1:]]
@@ -106,7 +103,7 @@ def _derivatives(samples: Sequence[np.ndarray], values: np.ndarray) -> np.ndarra
     derivatives = np.stack([change / step for change, step in zip(changes[:-1], steps, strict=True)])
     expected = numbers[0] + np.tensordot(values[-1] - values[0], derivatives, 1)
     if np.abs(expected - numbers[-1]).max(initial=0.0) > AFFINE * magnitude:
-        raise NotAffineError
+        raise RobotsApartError
     return derivatives
 
 
@@ -118,8 +115,8 @@ def constants_of_lanes(
     leaves, tree = jax.tree.flatten(family.first)
     changes = [value - start for value, start in zip(values, family.start, strict=True)]
     moved = [
-        leaf if each is None else _affine(leaf, each, changes)
-        for leaf, each in zip(leaves, family.derivatives, strict=True)
+        array if each is None else _affine(array, each, changes)
+        for array, each in zip(leaves, family.derivatives, strict=True)
     ]
     constants: Constants = jax.tree.unflatten(tree, moved)
     low, high, measure = constants.limits
@@ -137,10 +134,10 @@ def constants_of_lanes(
     return constants._replace(robot=dataclasses.replace(robot, platform_points=points))
 
 
-def _affine(leaf: Array, derivatives: Any, changes: Sequence[Array]) -> Array:
-    value = jnp.broadcast_to(leaf[..., None], (*leaf.shape, len(changes[0])))
+def _affine(array: Array, derivatives: Any, changes: Sequence[Array]) -> Array:
+    value = jnp.broadcast_to(array[..., None], (*array.shape, len(changes[0])))
     for derivative, change in zip(derivatives, changes, strict=True):
-        value = value + derivative[..., None] * change.reshape((1,) * leaf.ndim + change.shape)
+        value = value + derivative[..., None] * change.reshape((1,) * array.ndim + change.shape)
     return value
 
 
@@ -148,10 +145,10 @@ class SearchOverRobots(WorkspaceSearch):
     """Search for poses of many robots that meet a requirement; see `WorkspaceSearch`. `answers` takes the poses.
 
     Raises:
-        NotAffineError: the robots cannot be computed together.
+        RobotsApartError: the robots cannot be computed together.
     """
 
-    def __init__(self, samples: Samples) -> None:
+    def __init__(self, samples: RobotSamples) -> None:
         """Prepare the search from samples of the robots."""
         self._samples = samples._replace(robots=[_without_words(robot) for robot in samples.robots])
         super().__init__(self._samples.robots[0], samples.requirements[0])
@@ -161,7 +158,7 @@ class SearchOverRobots(WorkspaceSearch):
         # A facet normal that some robots lack would be missed in others: all samples must have all of them.
         is_full = len(self._choices.table) == math.comb(self.robot.n_cables, self.robot.dof - 1)
         if row.along_line or row.is_jointed or self.robot.pulleys is not None or not is_full:
-            raise NotAffineError
+            raise RobotsApartError
         self._choices = self._choices._replace(counts=None)
         self._has_limits = any(map(has_limits, samples.requirements))
         self._families = {
@@ -221,8 +218,8 @@ def _matrices(family: AffineConstants, batch: Any, length: Array) -> Any:
     columns, _ = geometry.wrench_columns(constants.robot, positions, quaternions, length)
     shape = positions[0].shape
 
-    def of_lanes(leaf: Array, first: Array) -> Array:
-        return jnp.broadcast_to(leaf if leaf.ndim > np.ndim(first) else leaf[..., None], np.shape(first) + shape)
+    def of_lanes(array: Array, first: Array) -> Array:
+        return jnp.broadcast_to(array if array.ndim > np.ndim(first) else array[..., None], np.shape(first) + shape)
 
     numbers, first = (constants.limits, constants.wrenches), (family.first.limits, family.first.wrenches)
     return jnp.stack(columns), jax.tree.map(of_lanes, numbers, first)
@@ -230,9 +227,9 @@ def _matrices(family: AffineConstants, batch: Any, length: Array) -> Any:
 
 def _largest(pair: tuple[AnyRobot, Requirement]) -> float:
     # The largest of the limits and of the required wrenches, N.
-    robot, asked = pair
-    sizes = asked.wrenches.magnitude, float(robot.mass * robot.gravity)
-    return float(np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max())
+    robot, demanded = pair
+    sizes = demanded.wrenches.magnitude, float(robot.mass * robot.gravity)
+    return float(np.abs([*demanded.low, *demanded.high[np.isfinite(demanded.high)], *sizes]).max())
 
 
 def _without_words(robot: AnyRobot) -> AnyRobot:
