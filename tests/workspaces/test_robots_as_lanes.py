@@ -12,6 +12,7 @@ import cspr_jax
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.robots.model.arrangements import arrangement_of
 from cspr_jax.schema.map_kinds import MapKind
+from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.search_over_robots import SearchOverRobots
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -28,6 +29,7 @@ MOVES = [
     },
     {"name": "strength", "value": 0, "lower": -2000, "upper": 3000, "moves": {"tension_max": 1}},
 ]
+LOAD = {"name": "load", "value": 0, "lower": -1, "upper": 4, "moves": {"mass": 1}}
 PLANAR = {
     "name": "planar",
     "pattern": "1R2T",
@@ -39,7 +41,7 @@ PLANAR = {
     "tension_max": 300.0,
     "parameter": [
         {"name": "size", "value": 1, "lower": 0.5, "upper": 2, "moves": {"scale": 1, "tension_min": 0.5}},
-        {"name": "load", "value": 0, "lower": -1, "upper": 4, "moves": {"mass": 1}},
+        LOAD,
     ],
 }
 POINT = {
@@ -173,12 +175,47 @@ def test_poses_that_kernels_leave_open_are_those_of_each_robot(monkeypatch):
     assert len(np.unique(together.verdict)) > 1
 
 
+def test_exact_margins_are_those_of_the_robot_of_each_pose(monkeypatch):
+    """Where kernels decide nothing. Robots alternate from cell to cell."""
+    spec = _spec("in a plane")
+    spec["axes"] = {name: spec["axes"][name] for name in reversed(spec["axes"])}
+    kernels = cspr_jax.compute_sweep(spec)
+    monkeypatch.setattr(WorkspaceSearch, "_stages", lambda self: iter(()))
+    exact = cspr_jax.compute_sweep(spec)
+    np.testing.assert_array_equal(kernels.verdict, exact.verdict)
+    np.testing.assert_allclose(kernels.wrench_margin, exact.wrench_margin, rtol=0.0, atol=1e-9)
+
+
+def test_arrangements_of_points_that_move(monkeypatch):
+    """A parameter moves the same attachment point, whichever cable ends in it."""
+    spec = _spec("eight cables", arrangement=[0, 5040, 40000])
+    spec["axes"] |= {"x": [0.4], "y": [0.2], "parameter.size": [1.0], "parameter.strength": [0.0]}
+    seen = _counted(monkeypatch)
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    assert sum(seen) == together.verdict.size
+    np.testing.assert_allclose(together.wrench_margin, alone.wrench_margin, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("more", "workspace"),
     [
         ({}, {"conditions": ["wrench-feasible", "interference-free"]}),
         ({"cable_length_max": 5.0}, {"conditions": ["wrench-feasible"]}),
         ({"pulley_radius": 0.05}, {"conditions": ["wrench-feasible"]}),
+        (
+            {
+                "centre_of_mass": [0.0, 0.0, 0.05],
+                "parameter": [MOVES[0], LOAD | {"moves": {"centre_of_mass[2]": 0.01}}],
+            },
+            {"conditions": ["static"]},
+        ),
+        (
+            {
+                "winch": {"drum_radius": 0.05, "motor_torque_max": 20.0},
+                "parameter": [MOVES[0], LOAD | {"moves": {"winch.drum_radius": 0.01}}],
+            },
+            {"conditions": ["wrench-feasible"]},
+        ),
     ],
 )
 def test_other_robots_and_conditions_are_computed_one_by_one(monkeypatch, more, workspace):
