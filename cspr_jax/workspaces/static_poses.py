@@ -140,13 +140,13 @@ class RestPoses:
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Iterator[tuple[str, Verdict | np.ndarray, np.ndarray, np.ndarray]]:
         """Quantity, flag or flags, slacks and allowance of each limit."""
-        centres = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
+            centres = mass_centres(self.robot, origins, quaternions)
             slack, radius = float(self.limits.floor) - self._depths(centres, quaternions), spool_radius(self.robot)
             yield "floor_margin", Verdict.BELOW_FLOOR, slack, TOUCHED * np.asarray(radius)
         if self.limits.cable_length_max is not None:
             longest = np.asarray(self.limits.cable_length_max)
-            slack = longest - self._lengths(centres, quaternions)
+            slack = longest - self._lengths(mass_centres(self.robot, origins, quaternions), quaternions)
             yield "length_margin", Verdict.CABLE_TOO_LONG, slack, TOUCHED * longest
         if self.speeds is not None:
             slack = self.speeds.margins(origins, quaternions)
