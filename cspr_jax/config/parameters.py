@@ -75,12 +75,12 @@ def moved(
 def _arrangement(spec: Mapping[str, Any], values: Mapping[str, float]) -> int:
     # Number of the arrangement among the values; 0 where there is none.
     number, points = values.get(ARRANGEMENT, 0.0), spec.get("platform_points")
-    if ARRANGEMENT in values and points is None:
-        raise InputError(f"parameters.{ARRANGEMENT}", number, "absent: all cables of a point mass end in it")
-    largest = math.factorial(len(points or ())) - 1
     is_whole = float(number).is_integer()
+    value = int(number) if is_whole else number
+    if ARRANGEMENT in values and points is None:
+        raise InputError(f"parameters.{ARRANGEMENT}", value, "absent: all cables of a point mass end in it")
+    largest = math.factorial(len(points or ())) - 1
     if not is_whole or not 0 <= number <= largest:
-        value = int(number) if is_whole else number
         raise InputError(f"parameters.{ARRANGEMENT}", value, f"a whole number from 0 to {largest}")
     return int(number)
 

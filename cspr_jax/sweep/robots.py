@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.config.arrangements import arrangement_points
+from cspr_jax.config.arrangements import Invariants, arrangement_points
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.missing_cables import without_cables
 from cspr_jax.config.robot import RobotFile
@@ -15,6 +15,12 @@ from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.schema.map_kinds import MapKind
 from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER, is_of_robot, parameter_values
+
+# Keys of workspaces in which directions differ, so that mirrored robots have other workspaces.
+_DIRECTIONS = (
+    *("orientation", "quaternions", "wrenches", "wrench_box", "wrench_ellipsoid"),
+    *("obstacle", "platform_box", "platform_hull"),
+)
 
 
 def robot_of(robot_file: RobotFile, spec: SweepFile, kind: MapKind, file: object) -> RobotFile:
@@ -38,9 +44,11 @@ def arrangement_axis(spec: SweepFile, robot_file: RobotFile, file: object) -> di
     """The axis of arrangements of a sweep file, if it has one."""
     if spec.axes.arrangement is None:
         return {}
-    has_lists = any(isinstance(value, list) for value in vars(spec.limits).values())
+    workspace, has_lists = spec.workspace, any(isinstance(value, list) for value in vars(spec.limits).values())
+    has_directions = workspace is None or any(getattr(workspace, key) is not None for key in _DIRECTIONS)
+    invariants = Invariants(points=spec.axes.parameter is None, cables=not has_lists, directions=not has_directions)
     try:
-        points = arrangement_points(robot_file.full, spec.axes.arrangement, has_lists=has_lists)
+        points = arrangement_points(robot_file.full, spec.axes.arrangement, invariants)
     except InputError as error:
         raise ConfigError(file, f"axes.{error}") from error
     return {ARRANGEMENT: points}

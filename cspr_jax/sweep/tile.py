@@ -80,9 +80,8 @@ class TileMap:
         with short_batches():
             parts, counts = zip(*in_threads(of_robot, robots), strict=True)
         order = np.argsort(np.concatenate([indices for _, indices in robots]))
-        names = [
-            name for name, values in parts[0].items() if np.ndim(values)
-        ]  # what has no number a cell is not stored
+        # Answers without a number for each cell are not stored.
+        names = [name for name, values in parts[0].items() if np.ndim(values)]
         answers = {name: np.concatenate([part[name] for part in parts])[order] for name in names}
         return answers, None if None in counts else sum(counts)
 

@@ -9,7 +9,8 @@ import pytest
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.config.arrangements import _symmetries, arrangement_points
+from cspr_jax.api.sweeps import checked_sweep
+from cspr_jax.config.arrangements import Invariants, _symmetries, arrangement_points
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
@@ -73,7 +74,7 @@ def test_a_frame_with_all_symmetries_of_a_square():
         platform_points=[[*(0.2 * np.array(point[:2])), point[2] - 2.0] for point in eight],
         parameter=None,
     )
-    symmetries = _symmetries(robot)
+    symmetries = _symmetries(robot, Invariants())
     assert len({tuple(one.spools) + tuple(one.attachments) for one in symmetries[:8]}) == 8
     of_four = [one._replace(spools=one.spools[:4] % 4, attachments=one.attachments[:4]) for one in symmetries[:8]]
     assert len(distinct_arrangements(4, of_four)) == sum(fixed) / 8
@@ -82,12 +83,32 @@ def test_a_frame_with_all_symmetries_of_a_square():
 def test_points_that_fall_together_and_cables_that_differ():
     points = PLANAR["platform_points"]
     both = _robot(platform_points=[points[0], points[0], points[2], points[3]], parameter=None)
-    assert len(arrangement_points(both, "all", has_lists=False)) == 12
-    assert len(arrangement_points(_robot(), "all", has_lists=False)) < 24
+    assert len(arrangement_points(both, "all", Invariants())) == 12
+    assert len(arrangement_points(_robot(), "all", Invariants())) < 24
     for differs in ({"tension_max": [60.0, 60.0, 60.0, 50.0]}, {"pulley_radius": [0.1, 0.2, 0.1, 0.1]}):
-        assert len(arrangement_points(_robot(**differs), "all", has_lists=False)) == 24
-    assert len(arrangement_points(_robot(tension_max=[60, 60, 50, 50]), "all", has_lists=False)) < 24
-    assert len(arrangement_points(_robot(), "all", has_lists=True)) == 24
+        assert len(arrangement_points(_robot(**differs), "all", Invariants())) == 24
+    assert len(arrangement_points(_robot(tension_max=[60, 60, 50, 50]), "all", Invariants())) < 24
+    assert len(arrangement_points(_robot(), "all", Invariants(cables=False))) == 24
+
+
+def test_copies_are_those_of_all_that_a_sweep_asks_for():
+    """Identical robots are copies whatever is asked for; mirrored ones only where nothing tells directions apart."""
+    points = PLANAR["platform_points"]
+    robot = PLANAR | {"platform_points": [points[0], points[0], points[2], points[3]]}
+    robot = {name: value for name, value in robot.items() if name != "parameter"}
+    arm = PLANAR["parameter"][0] | {"moves": {"platform_points[1][0]": 1.0}}
+
+    def count(changes, of=robot):
+        spec = (
+            SWEEP | {"robot": of} | {name: SWEEP[name] | value for name, value in changes.items() if name != "limits"}
+        )
+        return len(checked_sweep(spec | {k: v for k, v in changes.items() if k == "limits"}).grid.axes["arrangement"])
+
+    mirrored = robot | {"platform_points": points}
+    assert count({}, mirrored) < 24 == count({"workspace": {"wrench_box": [1.0, 1.0, 0.1]}}, mirrored)
+    assert count({}) == 12 == count({"workspace": {"wrenches": [[0.0, -20.0, 0.0]]}})
+    assert count({"limits": {"tension_max": [50.0, 50.0, 50.0, 50.0]}}) == 12
+    assert count({"axes": {"parameter.arm": [0.2, 0.3]}}, robot | {"parameter": [arm]}) == 24
 
 
 def test_values_of_parameters_move_the_same_points_in_any_arrangement():
@@ -165,4 +186,4 @@ def test_point_masses_and_reserved_names():
         _robot(parameter=[table])
     ten = {"base_points": [[i, 0, 0] for i in range(10)], "platform_points": [[0.1 * i, 0, 0.1] for i in range(10)]}
     with pytest.raises(InputError, match="a list, of robots on more than 9 cables"):
-        arrangement_points(_robot(**ten, parameter=None), "all", has_lists=False)
+        arrangement_points(_robot(**ten, parameter=None), "all", Invariants())

@@ -77,16 +77,17 @@ def symmetries_of(
     groups: Sequence[object],
     *,
     is_planar: bool,
+    has_turns: bool,
 ) -> list[Symmetry]:
-    """Symmetries that generate all others: turns about the vertical, mirrors, and points that fall together.
+    """Symmetries that generate all others: points that fall together and, if asked for, turns and mirrors.
 
-    `groups` has equal entries for spools whose cables have equal numbers.
+    `groups` has equal entries for spools whose cables have equal numbers; turns are about the vertical.
     """
     middle = spools.mean(0)
     of_spools, names = spools - middle, [groups.index(group) for group in groups]
     extent = max(np.abs(of_spools).max(), np.abs(attachments).max()) * SAME
     result = []
-    for turn in _turns(of_spools, extent, is_planar=is_planar):
+    for turn in _turns(of_spools, extent, is_planar=is_planar) if has_turns else ():
         stays = np.abs(turn @ centre_of_mass - centre_of_mass).max() <= extent
         spread = np.abs(turn @ inertia @ turn.T - inertia).max()
         images = _images(of_spools, turn, extent), _images(attachments, turn, extent)
