@@ -12,6 +12,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.arrangements import (
     MAX_CABLES_OF_ALL,
+    MAX_CABLES_OF_NUMBERS,
     Symmetry,
     distinct_arrangements,
     numbers_of,
@@ -51,6 +52,9 @@ def arrangement_points(
         return distinct_arrangements(count, _symmetries(robot_file, invariants)).astype(float)
     if not isinstance(arrangements[0], list):
         return np.array(arrangements, float)
+    if count > MAX_CABLES_OF_NUMBERS:
+        allowed = f"must be of at most {MAX_CABLES_OF_NUMBERS}, since others have no exact numbers"
+        raise InputError("arrangement", None, allowed, problem=f"permutations of {count} cables")
     for each in arrangements:
         if sorted(each) != list(range(count)):
             raise InputError("arrangement", each, f"the numbers 0 to {count - 1}, each once")

@@ -26,10 +26,10 @@ from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, Tr
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.missing_cables import ANY_ONE, DESCRIPTION, MissingCables
 from cspr_jax.config.reading import Table
-from cspr_jax.config.wording import either, name_of
+from cspr_jax.config.wording import either, name_of, table_error
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import PARAMETER, PARAMETER_NAME, QUANTITIES
+from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER, PARAMETER_NAME, QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
@@ -133,6 +133,12 @@ class Axes(Table):
         axes = {name.removeprefix(PARAMETER): axis for name, axis in named.items()}
         others = {name: axis for name, axis in data.items() if name not in named}
         return others | {"parameter": {**(table if isinstance(table, dict) else {}), **axes}}
+
+    @model_validator(mode="after")
+    def _are_parameters(self) -> "Axes":
+        if self.parameter and ARRANGEMENT in self.parameter:
+            raise table_error(f"{PARAMETER}{ARRANGEMENT}", "an axis", f"called {ARRANGEMENT} alone")
+        return self
 
     @model_serializer(mode="wrap")
     def _named(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

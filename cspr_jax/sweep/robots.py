@@ -44,7 +44,9 @@ def arrangement_axis(spec: SweepFile, robot_file: RobotFile, file: object) -> di
     """The axis of arrangements of a sweep file, if it has one."""
     if spec.axes.arrangement is None:
         return {}
-    workspace, has_lists = spec.workspace, any(isinstance(value, list) for value in vars(spec.limits).values())
+    workspace = spec.workspace
+    # Cables differ where some of them are gone, or have limits of their own.
+    has_lists = isinstance(spec.without, list) or any(isinstance(limit, list) for limit in vars(spec.limits).values())
     has_directions = workspace is None or any(getattr(workspace, key) is not None for key in _DIRECTIONS)
     invariants = Invariants(points=spec.axes.parameter is None, cables=not has_lists, directions=not has_directions)
     try:

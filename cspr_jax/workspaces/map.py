@@ -284,5 +284,9 @@ class WorkspaceMap(GridMap):
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         inside = answers["verdict"] == 0
         side = answers["cell_side"]
-        claims = {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
+        allowances = self._poses.allowances
+        claims = {
+            f"a cell inside with a {name} below zero": inside & (answers[name] < -allowances.get(name, 0.0))
+            for name in MARGINS
+        }
         return claims | {"a cell proved to be on the other side": (side == 1) & ~inside | (side == 2) & inside}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from cspr_jax.workspaces.search_over_robots import RobotRows, RobotSamples, Sear
 
 # Number of arrangements from which the structure of wrench matrices is taken.
 TRIED = 6
+# Largest number of parameters: samples are up to a power of three.
+MAX_PARAMETERS = 4
 
 
 class WorkspacesOfRobots(WorkspaceMap):
@@ -31,12 +34,10 @@ class WorkspacesOfRobots(WorkspaceMap):
 
     def __init__(self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> None:
         """Prepare the map from a few of the robots."""
-        first = {name: float(axes[name][0]) for name in axes if is_of_robot(name) and name != ARRANGEMENT}
-        farthest = {name: float(axes[name][np.abs(axes[name] - first[name]).argmax()]) for name in first}
-        self._names = [name for name in first if farthest[name] != first[name]]
-        middle = {name: 0.5 * (first[name] + farthest[name]) for name in first}
-        values = [first, *(first | {name: farthest[name]} for name in self._names), middle]
-        super().__init__(robot_at(parameter_values(first)), spec, file)
+        points = {name: np.unique(axes[name]) for name in axes if is_of_robot(name) and name != ARRANGEMENT}
+        self._names = [name for name in points if len(points[name]) > 1]
+        values = _sampled(points, self._names)
+        super().__init__(robot_at(parameter_values(values[0])), spec, file)
         self._numbers = np.sort(axes[ARRANGEMENT]) if ARRANGEMENT in axes else None
         self._refuse_others(spec)
         others = [WorkspaceMap(robot_at(parameter_values(each)), spec, file).sample() for each in values[1:]]
@@ -76,6 +77,17 @@ class WorkspacesOfRobots(WorkspaceMap):
         if self._numbers is None:
             return RobotRows(values, None)
         return RobotRows(values, self._arrangements[np.searchsorted(self._numbers, cells[ARRANGEMENT])])
+
+
+def _sampled(points: dict[str, np.ndarray], names: list[str]) -> list[dict[str, float]]:
+    # Values of the samples: all smallest ones, the largest of each, then all choices of the smallest, the middle and
+    # the largest, at which limits that are the smaller of two affine functions are seen to be no affine function.
+    if len(names) > MAX_PARAMETERS:
+        raise RobotsApartError
+    first = {name: float(values[0]) for name, values in points.items()}
+    singles = [first | {name: float(points[name][-1])} for name in names]
+    three = [np.unique(points[name][[0, len(points[name]) // 2, -1]]).tolist() for name in names]
+    return [first, *singles, *(first | dict(zip(names, each, strict=True)) for each in itertools.product(*three))]
 
 
 def _count(cells: dict[str, np.ndarray]) -> int:

@@ -312,9 +312,14 @@ class WorkspaceSearch:
         poses = positions, quaternions
         return in_batches(lambda x: geometry.weights(self.robot, *x), poses, batch_size=BATCH) / self.unit
 
+    @property
+    def allowance(self) -> float:
+        """Distance from a limit within which it may be touched, N."""
+        return TOUCHED / BOUNDARY * self._boundary
+
     def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:
         # Poses at which tensions touch or slightly exceed limits, but keep the limits widened by the allowance.
-        rows = np.flatnonzero(np.abs(margin) <= TOUCHED / BOUNDARY * self._boundary)
+        rows = np.flatnonzero(np.abs(margin) <= self.allowance)
         if self._measure == "closure" or not self._has_limits or not len(rows):
             return rows[:0]
         return rows[self._exactly(poses.rows(rows), TOUCHED)[0] > FORMULAS_UNDECIDED / BOUNDARY * self._boundary]

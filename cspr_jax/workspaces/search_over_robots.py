@@ -24,13 +24,16 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.facet_normals import choices_of
 from cspr_jax.workspaces.poses.kernels import TensionLimits
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
-from cspr_jax.workspaces.requirements import Requirement
+from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 from cspr_jax.workspaces.search import BATCH, Constants, Poses, Stage, WorkspaceSearch, cast, has_limits
 
 # Numbers count as equal, and as affine, up to this fraction of the largest of their array.
 EQUAL, AFFINE = 1e-14, 1e-11
+# Largest ratio of the largest limits or weights of robots that share the distance from limits at which poses are open.
+LARGEST_RATIO = 1000.0
 
 
 class RobotRows(NamedTuple):
@@ -50,13 +53,13 @@ class RobotRows(NamedTuple):
 
 
 class RobotSamples(NamedTuple):
-    """Robots from which the others follow: the first, one in which each parameter differs, one in which all do.
+    """Robots from which the others follow: the first, one in which each parameter differs, and some to check.
 
     Fields:
         robots: robots, centred as the first is, z down.
         requirements: requirement of each.
-        values: (k + 2, k) their values of the parameters.
-        attachments: (m, n_cables) some arrangements of the cables; None: one.
+        values: (m, k) their values of the parameters, m > k.
+        attachments: (p, n_cables) some arrangements of the cables; None: one.
     """
 
     robots: Sequence[AnyRobot]
@@ -80,7 +83,7 @@ class AffineConstants(NamedTuple):
 
 
 def affine_constants(samples: Sequence[Constants], values: Float[np.ndarray, "s k"]) -> AffineConstants:
-    """Affine functions through samples, checked at the last one."""
+    """Affine functions through the first samples, checked at all."""
     leaves, trees = zip(*(jax.tree.flatten(sample) for sample in samples), strict=True)
     if any(tree != trees[0] for tree in trees):
         raise RobotsApartError
@@ -92,17 +95,20 @@ def _derivatives(samples: Sequence[np.ndarray], values: np.ndarray) -> np.ndarra
     if any(sample.shape != samples[0].shape for sample in samples):
         raise RobotsApartError
     finite = np.isfinite(samples[0])
-    if any(not np.array_equal(sample[~finite], samples[0][~finite], equal_nan=True) for sample in samples):
-        raise RobotsApartError
+    for sample in samples:
+        is_same = np.array_equal(sample[~finite], samples[0][~finite], equal_nan=True)
+        if not is_same or not np.array_equal(np.isfinite(sample), finite):
+            raise RobotsApartError
     numbers = [np.where(finite, sample, 0.0) for sample in samples]
     magnitude = max(np.abs(x).max(initial=0.0) for x in numbers)
     changes = [x - numbers[0] for x in numbers[1:]]
     if all(np.abs(change).max(initial=0.0) <= EQUAL * magnitude for change in changes):
         return None
-    steps = np.diagonal(values[1:] - values[0])
-    derivatives = np.stack([change / step for change, step in zip(changes[:-1], steps, strict=True)])
-    expected = numbers[0] + np.tensordot(values[-1] - values[0], derivatives, 1)
-    if np.abs(expected - numbers[-1]).max(initial=0.0) > AFFINE * magnitude:
+    count = values.shape[1]
+    steps = np.diagonal(values[1 : count + 1] - values[0])
+    derivatives = np.stack([change / step for change, step in zip(changes[:count], steps, strict=True)])
+    expected = numbers[0] + np.tensordot(values - values[0], derivatives, 1)
+    if np.abs(expected - np.stack(numbers)).max(initial=0.0) > AFFINE * magnitude:
         raise RobotsApartError
     return derivatives
 
@@ -153,12 +159,18 @@ class SearchOverRobots(WorkspaceSearch):
         self._samples = samples._replace(robots=[_without_words(robot) for robot in samples.robots])
         super().__init__(self._samples.robots[0], samples.requirements[0])
         pairs = list(zip(self._samples.robots, samples.requirements, strict=True))
-        self._boundary *= max(map(_largest, pairs)) / _largest(pairs[0])
-        row = PATTERNS[self.robot.pattern]
-        # A facet normal that some robots lack would be missed in others: all samples must have all of them.
+        row, magnitudes = PATTERNS[self.robot.pattern], [_largest(pair) for pair in pairs]
+        # A facet normal that some robots lack would be missed in others: all samples together must have all of them.
         is_full = len(self._choices.table) == math.comb(self.robot.n_cables, self.robot.dof - 1)
-        if row.along_line or row.is_jointed or self.robot.pulleys is not None or not is_full:
+        is_apart = max(magnitudes) > LARGEST_RATIO * min(magnitudes) or not is_full
+        if row.along_line or row.is_jointed or self.robot.pulleys is not None or is_apart:
             raise RobotsApartError
+        if self.requirement.condition == CLOSURE:
+            # Components that are zero at all poses of some robots are told from others by the robot.
+            if samples.attachments is not None or not self._has_all_components:
+                raise RobotsApartError
+        else:
+            self._boundary *= max(magnitudes) / magnitudes[0]
         self._choices = self._choices._replace(counts=None)
         self._has_limits = any(map(has_limits, samples.requirements))
         self._families = {
@@ -174,6 +186,8 @@ class SearchOverRobots(WorkspaceSearch):
         for each in () if self._samples.attachments is None else self._samples.attachments:
             robots.append(dataclasses.replace(robots[0], platform_points=np.asarray(robots[0].platform_points)[each]))
         parts = [self._trials_of(robot) for robot in robots]
+        choices = [choices_of(part[: self._few]) for part in parts]
+        self._has_all_components = all(choice.counts is None for choice in choices)
         self._few = max(self._few, len(parts))
         count = min(map(len, parts))
         return np.stack([part[:count] for part in parts], axis=1).reshape(-1, *parts[0].shape[1:])

@@ -73,6 +73,19 @@ class RestPoses:
         names = {margin_name(condition) for condition in self.searches} | {*capacity, "clearance"}
         return next(name for name in MARGINS if name in names)
 
+    @property
+    def allowances(self) -> dict[str, float]:
+        """Distances by which margins of poses that are inside may be below zero, since limits may be touched."""
+        forces = max((search.allowance for search in self.searches.values()), default=0.0)
+        result = {"wrench_margin": forces, "capacity_margin": forces}
+        if self.limits.floor is not None:
+            result["floor_margin"] = TOUCHED * float(spool_radius(self.robot))
+        if self.limits.cable_length_max is not None:
+            result["length_margin"] = TOUCHED * float(np.max(self.limits.cable_length_max))
+        if self.speeds is not None:
+            result["speed_margin"] = TOUCHED * float(np.max(self.speeds.maximum))
+        return result
+
     def origins(
         self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
     ) -> Float[np.ndarray, "n 3"]:

@@ -13,7 +13,7 @@ from cspr_jax.api.sweeps import checked_sweep
 from cspr_jax.config.arrangements import Invariants, _symmetries, arrangement_points
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.errors import InputError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.robots.model.arrangements import arrangement_of, distinct_arrangements, numbers_of
 
@@ -182,8 +182,28 @@ def test_point_masses_and_reserved_names():
     with pytest.raises(InputError, match=r"parameters.arrangement = 1: must be absent: all cables of a point mass"):
         mass.with_parameters({"arrangement": 1})
     table = PLANAR["parameter"][0] | {"name": "arrangement"}
-    with pytest.raises(cspr_jax.errors.ConfigError, match="a name that no other parameter has, nor arrangement"):
+    with pytest.raises(ConfigError, match="a name that no other parameter has, nor arrangement"):
         _robot(parameter=[table])
     ten = {"base_points": [[i, 0, 0] for i in range(10)], "platform_points": [[0.1 * i, 0, 0.1] for i in range(10)]}
     with pytest.raises(InputError, match="a list, of robots on more than 9 cables"):
         arrangement_points(_robot(**ten, parameter=None), "all", Invariants())
+
+
+def test_cables_that_are_gone_are_not_alike():
+    mirrored = {name: value for name, value in PLANAR.items() if name != "parameter"}
+    spec = SWEEP | {"robot": mirrored}
+    assert len(checked_sweep(spec).grid.axes["arrangement"]) < 24
+    assert len(checked_sweep(spec | {"without": [0]}).grid.axes["arrangement"]) == 24
+
+
+def test_arrangements_of_very_many_cables_have_no_numbers():
+    points = {"base_points": [[i, 0, 0] for i in range(20)], "platform_points": [[0.1 * i, 0, 0.1] for i in range(20)]}
+    robot = _robot(**points, parameter=None)
+    with pytest.raises(InputError, match="arrangement: permutations of 20 cables: must be of at most 18"):
+        arrangement_points(robot, [list(range(20))], Invariants())
+
+
+def test_the_axis_has_one_name():
+    for axes in ({"parameter.arrangement": [0, 1]}, {"parameter": {"arrangement": [0, 1]}}):
+        with pytest.raises(ConfigError, match=r"parameter\.arrangement = an axis: must be called arrangement alone"):
+            checked_sweep(SWEEP | {"axes": {"x": [0.0], "y": [0.0], "z": [0.5]} | axes})

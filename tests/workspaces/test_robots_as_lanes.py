@@ -222,6 +222,7 @@ def test_other_robots_and_conditions_are_computed_one_by_one(monkeypatch, more, 
     spec = _spec("in a plane")
     spec |= {"robot": json.loads(json.dumps(PLANAR | more)), "workspace": workspace}
     spec["axes"] = {name: points for name, points in spec["axes"].items() if name != "tilt"}
+    spec["axes"]["parameter.load"] = [-0.5, 1.0, 2.0]
     if "cable_length_max" not in more and "interference-free" in workspace["conditions"]:
         spec["robot"]["cable_diameter"] = 0.01
     seen = _counted(monkeypatch)
@@ -268,3 +269,71 @@ def test_where_cogiro_ranks():
     counts = (result.verdict == 0).sum(("x", "y", "z")).values
     assert counts.size == 40320 and counts[0] == 865 and counts.max() == 868 == counts[11641]
     assert ((counts > 865).sum(), (counts == 865).sum(), (counts == 0).sum()) == (4, 2, 1349)
+
+
+PIECEWISE = POINT | {
+    "base_points": [[1, 1, 0], [-1, 1, 0.1], [-1, -1, 0], [1, -1, -0.1]],
+    "mass": 20.0,
+    "tension_max": 100.0,
+    "winch": {"drum_radius": 1.0, "motor_torque_max": 250.0},
+    "parameter": [
+        {"name": "p", "value": 0, "lower": -70, "upper": 300, "moves": {"tension_max": 1.0}},
+        {"name": "q", "value": 0, "lower": -100, "upper": 100, "moves": {"winch.motor_torque_max": 1.0}},
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    "values", [{"p": [0, 100], "q": [0, -100]}, {"p": [0, -60, 299]}, {"p": [0.0, 300.0, 100.0], "q": [0.0]}]
+)
+def test_the_smaller_of_two_limits_is_no_affine_function(monkeypatch, values):
+    """The torque of a motor bounds tensions where their own limit is larger: at one corner, or between two values."""
+    axes = {f"parameter.{name}": each for name, each in values.items()}
+    targets = {"x": [0.0, 0.3], "y": [0.1], "z": [0.4, 0.5, 0.7, 0.9]}
+    workspace = {"conditions": ["wrench-feasible"]}
+    spec = {"schema": 1, "map": "workspace", "robot": PIECEWISE, "axes": axes | targets, "workspace": workspace}
+    seen = _counted(monkeypatch)
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    assert not seen
+    np.testing.assert_array_equal(together.verdict, alone.verdict)
+    np.testing.assert_array_equal(together.wrench_margin, alone.wrench_margin)
+
+
+def test_components_that_are_always_zero_are_those_of_each_robot(monkeypatch):
+    """Three cables at one point of a planar platform: closure is refuted there, and not left open."""
+    more = {"platform_points": [[-0.3, 0, 0]] * 3 + [[0.3, 0, 0]], "centre_of_mass": [0.0, 0.0, 0.0]}
+    spec = _spec("closure")
+    spec |= {"robot": CASES["closure"][0] | more}
+    spec["axes"] = {"parameter.size": [0.8, 1.2], "x": [-1.2, -0.3, 0.5], "y": [0.0], "z": [0.7, 1.5]}
+    together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
+    np.testing.assert_array_equal(together.verdict, alone.verdict)
+    np.testing.assert_array_equal(together.closure_margin, alone.closure_margin)
+
+
+@pytest.mark.parametrize("largest", [500.0, 2000.0])
+def test_poses_are_open_as_near_to_limits_as_those_of_each_robot(monkeypatch, largest):
+    """Unless the weights differ by less than a factor of a thousand."""
+    heavier = LOAD | {"lower": 0, "upper": 1e6}
+    robot = POINT | {"mass": 1.0, "tension_max": None, "parameter": [heavier]}
+    robot = {name: value for name, value in robot.items() if value is not None}
+    axes = {"parameter.load": [0.0, largest], "x": [0.0], "y": [0.2], "z": [0.5]}
+    spec = {"schema": 1, "map": "workspace", "robot": robot, "axes": axes, "workspace": {"conditions": ["static"]}}
+    seen = _counted(monkeypatch)
+    cspr_jax.compute_sweep(spec)
+    assert bool(seen) == (largest < 1000.0)
+
+
+def test_a_touched_limit_contradicts_nothing():
+    """A weight whose two cables have exactly the smallest tension."""
+    robot = {"name": "v", "planar": True, "mass": 2 / 9.81, "base_points": [[-1, 0, 0], [1, 0, 0]], "z_axis": "up"}
+    robot |= {"tension_min": float(np.sqrt(2.0)), "tension_max": 100.0}
+    axes = {"x": [0.0], "y": [0.0], "z": [-1.0]}
+    spec = {
+        "schema": 1,
+        "map": "workspace",
+        "robot": robot,
+        "axes": axes,
+        "workspace": {"conditions": ["wrench-feasible"]},
+    }
+    result = cspr_jax.compute_sweep(spec)
+    assert result.verdict.item() == 0 and abs(result.wrench_margin.item()) < 1e-12

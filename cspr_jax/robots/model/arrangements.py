@@ -17,6 +17,8 @@ from cspr_jax.numerics.shapes import Float, Int
 
 # Largest number of cables of which all arrangements are listed: 362,880.
 MAX_CABLES_OF_ALL = 9
+# Largest number of cables of which all numbers of arrangements are float64 numbers: 18! < 2^53.
+MAX_CABLES_OF_NUMBERS = 18
 # Points fall together if their distance is at most this fraction of the largest coordinate.
 SAME = 1e-9
 
