@@ -28,7 +28,7 @@ from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
 CHECK_ERROR = 1e-8
 # Robot at values of its parameters, and coordinates of axes.
 RobotAt = Callable[[Mapping[str, float]], RobotFile]
-Axes = Mapping[str, np.ndarray]
+Coordinates = Mapping[str, np.ndarray]
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 

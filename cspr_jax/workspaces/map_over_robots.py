@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.maps.grid_map import Axes, RobotAt, RobotsApartError
+from cspr_jax.maps.grid_map import Coordinates, RobotAt, RobotsApartError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
@@ -32,7 +32,7 @@ class WorkspacesOfRobots(WorkspaceMap):
         RobotsApartError: conditions or robots are not such that they can be computed together.
     """
 
-    def __init__(self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Axes) -> None:
+    def __init__(self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Coordinates) -> None:
         """Prepare the map from a few of the robots."""
         points = {name: np.unique(axes[name]) for name in axes if is_of_robot(name) and name != ARRANGEMENT}
         self._names = [name for name in points if len(points[name]) > 1]

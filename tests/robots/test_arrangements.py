@@ -147,6 +147,7 @@ def test_maps_of_some_and_of_all_arrangements_are_joined(tmp_path, monkeypatch, 
     assert code == 0, error
     joined, every = (cspr_jax.open_result(path) for path in ("joined/all.h5", "all/all.h5"))
     assert set(joined.axes["arrangement"]) == {*every.axes["arrangement"], 0.0, 23.0}
+    assert every.settings["arrangements"] == len(every.axes["arrangement"]) and "arrangements" not in joined.settings
     index = np.searchsorted(joined.axes["arrangement"], every.axes["arrangement"])
     np.testing.assert_array_equal(joined.data["wrench_margin"][..., index], every.data["wrench_margin"])
     best = every.best("arrangement")

@@ -78,11 +78,16 @@ CASES = {
 VALUES = {"size": [0.9, 1.3], "load": [-0.5, 2.0], "lift": [-0.4, 0.3], "strength": [-1500.0, 800.0]}
 
 
+def _feasible(robot, axes):
+    workspace = {"conditions": ["wrench-feasible"]}
+    return {"schema": 1, "map": "workspace", "robot": robot, "axes": axes, "workspace": workspace}
+
+
 def _spec(case, **axes):
     robot, targets, workspace = CASES[case]
     names = [table["name"] for table in robot["parameter"]]
     of_robot = {f"parameter.{name}": VALUES[name] for name in names} | axes
-    return {"schema": 1, "map": "workspace", "robot": robot, "axes": of_robot | targets, "workspace": workspace}
+    return _feasible(robot, of_robot | targets) | {"workspace": workspace}
 
 
 def _counted(monkeypatch):
@@ -142,8 +147,8 @@ def test_arrangements_beside_linear_programs(monkeypatch):
     rng, seen = np.random.default_rng(5), _counted(monkeypatch)
     numbers = rng.integers(0, 40320, 12).tolist()
     axes = {"x": [-3.1, 0.7], "y": [1.3], "z": [0.6, 2.1], "arrangement": numbers}
-    spec = {"schema": 1, "map": "workspace", "robot": EIGHT, "axes": axes}
-    result = cspr_jax.compute_sweep(spec | {"workspace": {"conditions": ["wrench-feasible"], "point": "mass-centre"}})
+    workspace = {"conditions": ["wrench-feasible"], "point": "mass-centre"}
+    result = cspr_jax.compute_sweep(_feasible(EIGHT, axes) | {"workspace": workspace})
     assert sum(seen) == result.verdict.size
     base, points = np.array(EIGHT["base_points"]), np.array(EIGHT["platform_points"])
     for i, number in enumerate(numbers):
@@ -160,13 +165,7 @@ def test_poses_that_kernels_leave_open_are_those_of_each_robot(monkeypatch):
     robot = POINT | {"base_points": [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], "tension_max": 50.0}
     robot |= {"parameter": [robot["parameter"][0]]}
     axes = {"parameter.load": [-0.5, 1.0, 2.0], "x": [0.0, 0.3], "y": [0.0], "z": [0.0, 0.5]}
-    spec = {
-        "schema": 1,
-        "map": "workspace",
-        "robot": robot,
-        "axes": axes,
-        "workspace": {"conditions": ["wrench-feasible"]},
-    }
+    spec = _feasible(robot, axes)
     seen = _counted(monkeypatch)
     together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
     assert sum(seen) == together.verdict.size
@@ -290,8 +289,7 @@ def test_the_smaller_of_two_limits_is_no_affine_function(monkeypatch, values):
     """The torque of a motor bounds tensions where their own limit is larger: at one corner, or between two values."""
     axes = {f"parameter.{name}": each for name, each in values.items()}
     targets = {"x": [0.0, 0.3], "y": [0.1], "z": [0.4, 0.5, 0.7, 0.9]}
-    workspace = {"conditions": ["wrench-feasible"]}
-    spec = {"schema": 1, "map": "workspace", "robot": PIECEWISE, "axes": axes | targets, "workspace": workspace}
+    spec = _feasible(PIECEWISE, axes | targets)
     seen = _counted(monkeypatch)
     together, alone = cspr_jax.compute_sweep(spec), _one_by_one(monkeypatch, spec)
     assert not seen
@@ -317,7 +315,7 @@ def test_poses_are_open_as_near_to_limits_as_those_of_each_robot(monkeypatch, la
     robot = POINT | {"mass": 1.0, "tension_max": None, "parameter": [heavier]}
     robot = {name: value for name, value in robot.items() if value is not None}
     axes = {"parameter.load": [0.0, largest], "x": [0.0], "y": [0.2], "z": [0.5]}
-    spec = {"schema": 1, "map": "workspace", "robot": robot, "axes": axes, "workspace": {"conditions": ["static"]}}
+    spec = _feasible(robot, axes) | {"workspace": {"conditions": ["static"]}}
     seen = _counted(monkeypatch)
     cspr_jax.compute_sweep(spec)
     assert bool(seen) == (largest < 1000.0)
@@ -328,12 +326,6 @@ def test_a_touched_limit_contradicts_nothing():
     robot = {"name": "v", "planar": True, "mass": 2 / 9.81, "base_points": [[-1, 0, 0], [1, 0, 0]], "z_axis": "up"}
     robot |= {"tension_min": float(np.sqrt(2.0)), "tension_max": 100.0}
     axes = {"x": [0.0], "y": [0.0], "z": [-1.0]}
-    spec = {
-        "schema": 1,
-        "map": "workspace",
-        "robot": robot,
-        "axes": axes,
-        "workspace": {"conditions": ["wrench-feasible"]},
-    }
+    spec = _feasible(robot, axes)
     result = cspr_jax.compute_sweep(spec)
     assert result.verdict.item() == 0 and abs(result.wrench_margin.item()) < 1e-12
