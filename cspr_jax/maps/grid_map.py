@@ -19,7 +19,6 @@ from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.numerics.tolerances import TOUCHED
-from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
@@ -99,14 +98,6 @@ class GridMap(abc.ABC):
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell can have an answer, for example with all targets out of reach."""
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
-
-    def _refuse_out_of_plane(self, grid: Grid) -> None:
-        if not PATTERNS[self._problem.robot.pattern].is_planar:
-            return
-        if "y" not in grid.axes or grid.axes["y"].any():
-            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
-        if grid.axes.get("from_y", np.zeros(1)).any():
-            raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # Return targets in the kernels' axes. Radius and azimuth are about the vertical through the spools' centroid.

@@ -60,7 +60,6 @@ class ProvedMap(GridMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
         if pose_conditions(self._problem.robot)[1]:
             super().refuse_hopeless(grid)
 

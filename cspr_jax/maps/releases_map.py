@@ -13,5 +13,4 @@ class ReleasesMap(FromPositionsMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid whose starts are all out of reach; objects may land anywhere; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")

@@ -64,8 +64,8 @@ def check_map(kind: MapKind, spec: SweepFile, path: Path) -> None:
         raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{spec.trajectory.beat}"')
 
 
-def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
-    """Refuse coordinates out of their range."""
+def check_points(axes: dict[str, np.ndarray], kind: MapKind, robot: RobotFile, path: Path) -> None:
+    """Refuse coordinates out of their range, and out of the plane of a planar robot that the map moves."""
     for name, inside, allowed in (
         ("z0", lambda p: p > 0.0, "a number > 0"),
         ("radius", lambda p: p >= 0.0, "a number >= 0"),
@@ -80,6 +80,12 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
         wrong = points[~inside(points)]
         if len(wrong):
             raise ConfigError(path, f"axes.{name} = {shown(float(wrong[0]))}: must be {allowed}")
+    # Maps that move no planar robots refuse the robot, whatever the axes are.
+    if robot.is_planar and (not kind.patterns or robot.own_pattern in kind.patterns):
+        if "y" not in axes or axes["y"].any():
+            raise ConfigError(path, "axes.y: must be [0] for a planar robot")
+        if axes.get("from_y", np.zeros(1)).any():
+            raise ConfigError(path, "axes.from_y: must be [0] for a planar robot")
 
 
 def is_given(spec: SweepFile, name: str) -> bool:

@@ -115,7 +115,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     tile = usual if spec.run.tile is None else _tile(spec.run.tile, shape, path)
     _check_size(counts, tile, usual, bytes_needed(shape, store, spec.run.dtype), path)
     axes = axes_of(spec, names, robot, path)
-    check_points(axes, path)
+    check_points(axes, kind, robot, path)
     check_robots(robot, spec, kind, axes, path)
     axes |= orientation_axes
     # Leave out keys that are not given, so that keys of later versions do not change old identities.
@@ -135,7 +135,7 @@ def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> S
     over_orientations = _orientation_axes(spec) if kind.is_over_orientations else {}
     file_axes = axes_of(spec, axis_names(settings["axes"]), robot, file)
     axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}
-    check_points(file_axes, file)
+    check_points(file_axes, kind, robot, file)
     run = settings["run"]
     types = {name: dtype_of(name, spec.run.dtype) for name in run["store"]}
     return Sweep(file, kind, spec, robot, Grid(axes, tuple(run["tile"])), list(run["store"]), settings, text, types)

@@ -32,8 +32,7 @@ class FeasibleAccelerationMap(PointMassMap):
         return answers | {"verdict": answers["verdict"].astype(FLAGS)}
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse positions outside of the plane of a planar robot; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
+        """Refuse no grid: each position has an answer; see `GridMap.refuse_hopeless`."""
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

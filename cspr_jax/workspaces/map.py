@@ -262,10 +262,8 @@ class WorkspaceMap(GridMap):
         return np.stack(half_sizes, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse positions outside of the plane of a planar robot; see `GridMap.refuse_hopeless`."""
+        """Refuse axes of orientations that do not fit the robot or the keys; see `GridMap.refuse_hopeless`."""
         row = self._row
-        if row.is_planar and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
-            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
         turning = [name for name in TILT_TORSION if name in grid.axes]
         if turning and not row.is_body:
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")

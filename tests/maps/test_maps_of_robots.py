@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import cspr_jax
+from cspr_jax.api.sweeps import checked_sweep
 from cspr_jax.config.robot import resolve_robot
+from cspr_jax.errors import ConfigError
 from cspr_jax.schema.map_kinds import MAP_KINDS
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
@@ -69,3 +71,40 @@ def test_maps_over_robots_are_the_maps_of_each_robot(kind):
 
 def test_every_kind_is_here():
     assert set(FILES) == set(MAP_KINDS)
+
+
+PLANAR = {
+    **{"name": "plane", "planar": True, "base_points": [[0.7, 0, 0], [-0.7, 0, 0]], "mass": 0.1},
+    "parameter": [{"name": "size", "value": 1, "lower": 0.5, "upper": 3, "moves": {"scale": 1}}],
+}
+FORMS = {"least-time-paths": "least_time_paths", "least-time-free": "least_time_free"}
+IN_A_PLANE = [name for name in (*FILES, *FORMS) if not name.startswith(("attain", "orient", "poses", "minimum-arcs"))]
+
+
+@pytest.mark.parametrize("axes", [{}, {"parameter.size": VALUES}], ids=["one", "many"])
+@pytest.mark.parametrize("kind", IN_A_PLANE)
+def test_targets_of_planar_robots_lie_in_its_plane(kind, axes):
+    spec = tomllib.loads((SWEEPS / f"{(FILES | FORMS)[kind]}.toml").read_text())
+    spec |= {"robot": PLANAR, "axes": axes | {name: _points(axis) for name, axis in spec["axes"].items()} | {"y": [0]}}
+    spec.pop("limits", None)
+    spec.pop("run", None)
+    assert checked_sweep(spec).robot.is_planar
+    wrong = {"y": [0, 0.1]}, {"from_y": [0, 0.1], "from_x": [0.1], "from_z": [1.0]}
+    for more in wrong if "axes.from_y" in MAP_KINDS[spec["map"]].of(_family(spec)).keys else wrong[:1]:
+        changed = spec | {"axes": spec["axes"] | more}
+        with pytest.raises(ConfigError) as error:
+            checked_sweep(changed)
+        assert str(error.value) == f"sweep: axes.{next(iter(more))}: must be [0] for a planar robot"
+    polar = {name: points for name, points in spec["axes"].items() if name not in ("x", "y")}
+    with pytest.raises(ConfigError, match=r"axes.y: must be \[0\] for a planar robot"):
+        checked_sweep(spec | {"axes": {"radius": [0.5], "azimuth": [0.0]} | polar})
+
+
+def _family(spec):
+    return spec.get("trajectory", {}).get("family", "hypocycloid-standard")
+
+
+def test_a_map_of_no_planar_robot_refuses_the_robot():
+    spec = _small("minimum-arcs") | {"robot": PLANAR}
+    with pytest.raises(ConfigError, match='robot "plane" is planar: must be one that moves in space in this map'):
+        cspr_jax.compute_sweep(spec)

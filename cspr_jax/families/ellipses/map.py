@@ -13,7 +13,6 @@ from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import formula_hull
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.robots.model.point_mass import PLANAR
-from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 MAX_CABLES = 250
@@ -58,11 +57,6 @@ class EllipseMap(PointMassMap):
         frequency = np.full(len(centres), rule) if isinstance(rule, float) else rule
         rotated = (np.broadcast_to(self._frame.rotated(axis), centres.shape) for axis in (a, b))
         return ellipse_cells(self._problem, Ellipse(centres, *rotated), cells.get("frequency", frequency)).arrays()
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse centres that are all out of reach; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
-        super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

@@ -4,7 +4,6 @@ import numpy as np
 
 from cspr_jax.families.lines.least_time import least_times
 from cspr_jax.maps.from_positions import FromPositionsMap
-from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 
@@ -21,11 +20,6 @@ class LeastTimeMap(FromPositionsMap):
         largest = np.inf if spec.max_acceleration is None else spec.max_acceleration
         starts, ends = self._starts(cells), self._targets(cells)
         return least_times(self._problem, starts, ends, max_acceleration=largest).arrays()
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
-        super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

@@ -11,7 +11,6 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.families.swings.transitions.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.families.swings.transitions.transition import depth_for
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.schema.tiles import Grid
 
 # Depth for targets above the spools, which have no P0 below them: their verdict does not depend on it.
 _ANY_DEPTH = 1.0
@@ -47,8 +46,3 @@ class MinimumOscillationsMap(PointMassMap):
         points = (jnp.asarray(targets), jnp.asarray(inclination))
         z0 = np.asarray(jax.vmap(partial(depth_for, self._problem.robot))(*points))
         return np.where(z0 > 0.0, z0, _ANY_DEPTH)
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_plane(grid)
-        super().refuse_hopeless(grid)
