@@ -305,7 +305,7 @@ def plan(given: File, parameters: Parameters = None) -> Plan:
     Args:
         given: path of a plan file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
             lists). Paths in a dictionary are relative to the current folder.
-        parameters: values of parameters of the robot file, by name; they replace those of the plan.
+        parameters: values of parameters of the plan and of the robot file, by name; they replace those of the plan.
 
     Returns:
         the plan, feasible or not.

@@ -192,7 +192,7 @@ def run(
         given: path of a sweep file, or its content as a dictionary (parsed TOML, which may hold arrays instead of
             lists). Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
         directory: run directory; None: results/<sweep>-<first 12 digits of its identity>.
-        parameters: values of parameters of the robot file, by name; they replace those of the sweep.
+        parameters: values of parameters of the sweep and of the robot file, by name; they replace those of the sweep.
         workers: number of processes on this machine; None: the usual number for its kind of map. Above 1, a script must
             call this function under `if __name__ == "__main__":`.
         scheduler: address of a dask.distributed scheduler whose workers compute instead.

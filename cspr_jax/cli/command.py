@@ -46,14 +46,14 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
-    """Add the option that sets parameters of the robot."""
+    """Add the option that sets parameters of the file or of its robot."""
     parser.add_argument(
         "--set",
         dest="parameters",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="value of a parameter of the robot file, [[parameter]]; may be given several times",
+        help="value of a parameter of the file or of its robot, [[parameter]]; may be given several times",
     )
 
 
@@ -67,7 +67,7 @@ def parameters_of(options: argparse.Namespace) -> dict[str, float]:
         except ValueError:
             values[name] = math.nan
         if not name or not math.isfinite(values[name]):
-            raise ConfigError("--set", f"{text}: must be NAME=VALUE, a parameter of the robot and a number")
+            raise ConfigError("--set", f"{text}: must be NAME=VALUE, a parameter and a number")
     return values
 
 

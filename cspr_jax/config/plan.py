@@ -4,18 +4,19 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import Discriminator, Field, ModelWrapValidatorHandler, PrivateAttr, Tag, model_validator
 
 from cspr_jax.config.keys.ellipse import ELLIPSE_KEYS, EllipseTable
 from cspr_jax.config.keys.free_motions import FreeMotionKeys
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.config.keys.limits import LimitTable, Point, Positive
 from cspr_jax.config.keys.obstacles import ObstacleKeys
-from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, ParameterValues
+from cspr_jax.config.keys.parameter import OWN_DESCRIPTION, VALUES_DESCRIPTION, ParameterTables, ParameterValues
 from cspr_jax.config.keys.path import PathTable
 from cspr_jax.config.keys.pose import Pose, Turns
 from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.missing_cables import DESCRIPTION, MissingCables
+from cspr_jax.config.parameters import at_values
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml, refuse_other_kinds
 from cspr_jax.config.wording import name_of, table_error
 from cspr_jax.errors import ConfigError, shown
@@ -42,6 +43,9 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     parameters: ParameterValues | None = Field(None, description=VALUES_DESCRIPTION)
+    parameter: ParameterTables | None = Field(
+        None, description=OWN_DESCRIPTION.format('"z0", "amplitude.epsilon" or "pose[1].position[2]"', "")
+    )
     without: MissingCables | None = Field(None, description=DESCRIPTION)
     z0: Depth | None = Field(
         None,
@@ -320,6 +324,11 @@ class PlanFile(TrajectoryKeys, LimitTable, ObstacleKeys, FreeMotionKeys):
                 )
         # Move limits from the table [limits] to the plan itself: the rest of the program finds them in one place.
         return self.model_copy(update={"limits": None, **limits})
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _at_values(cls, data: Any, handler: ModelWrapValidatorHandler["PlanFile"]) -> "PlanFile":
+        return at_values(cls, data, handler, "plan")
 
 
 def read_plan(text: str, path: Path) -> PlanFile:

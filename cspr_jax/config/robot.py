@@ -1,6 +1,6 @@
 """Robot files and the catalogue."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,9 +21,9 @@ from cspr_jax.config.keys.limits import (
     Point,
     Positive,
 )
-from cspr_jax.config.keys.parameter import MAX_PARAMETERS, ParameterTable
+from cspr_jax.config.keys.parameter import ParameterTable, ParameterTables
 from cspr_jax.config.keys.winch import WinchTable
-from cspr_jax.config.parameters import check_bounds, check_parameters, moved
+from cspr_jax.config.parameters import check_bounds, check_names, check_parameters, moved, of_numbers
 from cspr_jax.config.reading import checked, other_case, read_toml, refuse_other_kinds
 from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, InputError, demand, shown
@@ -104,7 +104,7 @@ class RobotFile(LimitKeys):
         "simulations for MuJoCo have it (default 0)",
     )
     winch: WinchTable | None = Field(None, description="winches of the cables")
-    parameter: Annotated[list[ParameterTable], Field(min_length=1, max_length=MAX_PARAMETERS)] | None = Field(
+    parameter: ParameterTables | None = Field(
         None, description="[[parameter]]: named numbers that move others, for designs, maps over robots, and --set"
     )
     _notes: tuple[str, ...] = PrivateAttr(())  # about items of a file of another program
@@ -293,7 +293,7 @@ class RobotFile(LimitKeys):
         if self.parameter:
             spec = self.model_dump(exclude_none=True, exclude={"parameter"})
             check_parameters(self.parameter, spec)
-            check_bounds(self.parameter, spec, _of_numbers)
+            check_bounds(self.parameter, spec, RobotFile, "robot")
         return self
 
     def with_parameters(self, values: Mapping[str, float]) -> "RobotFile":
@@ -307,7 +307,7 @@ class RobotFile(LimitKeys):
         if there is None:
             return self
         try:
-            robot_file = _of_numbers(there[0]).model_copy(update={"parameter": there[1]})
+            robot_file = of_numbers(RobotFile, there[0], "robot").model_copy(update={"parameter": there[1]})
         except ConfigError as error:
             raise InputError("parameters", dict(values), "values that give a robot", problem=str(error)) from error
         robot_file._file, robot_file._notes = self._file, self._notes
@@ -325,14 +325,6 @@ class RobotFile(LimitKeys):
         return f"robot.{error.key} = {shown(value)}: {demand(error.allowed)}"
 
 
-def _of_numbers(spec: dict[str, Any]) -> RobotFile:
-    # Errors name no file: the numbers are those of a file, moved.
-    try:
-        return checked(RobotFile, spec, "")
-    except ConfigError as error:
-        raise ConfigError("robot", error.lines[0].removeprefix(": ")) from error
-
-
 def _check_level(points: list[Point]) -> None:
     (x1, _, z1), (x2, _, z2) = points
     if abs(z2 - z1) > LEVEL * abs(x2 - x1):
@@ -341,11 +333,16 @@ def _check_level(points: list[Point]) -> None:
 
 
 def resolve_robot(
-    reference: Any, file: object, directory: Path, parameters: Mapping[str, float] | None = None
+    reference: Any,
+    file: object,
+    directory: Path,
+    parameters: Mapping[str, float] | None = None,
+    of_file: Sequence[ParameterTable] | None = None,
 ) -> RobotFile:
-    """The robot that a plan or sweep names, at the values that it gives to the robot's parameters."""
+    """The robot that a plan or sweep with parameters of its own names, at its values of the robot's parameters."""
     robot_file = _named_robot(reference, file, directory)
     try:
+        check_names(of_file or [], robot_file.parameter or [], parameters or {})
         return robot_file.with_parameters(parameters or {})
     except InputError as error:
         raise ConfigError(file, str(error)) from error

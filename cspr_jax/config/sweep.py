@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import (
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     SerializerFunctionWrapHandler,
     Tag,
     field_validator,
@@ -20,11 +21,18 @@ from cspr_jax.config.keys.ellipse import SweepEllipse
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import Coordinate, LimitTable, Point
 from cspr_jax.config.keys.obstacles import ObstacleKeys, Obstacles
-from cspr_jax.config.keys.parameter import VALUES_DESCRIPTION, Arrangements, ParameterValues
+from cspr_jax.config.keys.parameter import (
+    OWN_DESCRIPTION,
+    VALUES_DESCRIPTION,
+    Arrangements,
+    ParameterTables,
+    ParameterValues,
+)
 from cspr_jax.config.keys.path import TargetPath
 from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.missing_cables import ANY_ONE, DESCRIPTION, MissingCables
+from cspr_jax.config.parameters import at_values
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, name_of, table_error
 from cspr_jax.numerics.shapes import Float
@@ -272,6 +280,10 @@ class _SweepKeys(Table):
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     parameters: ParameterValues | None = Field(None, description=VALUES_DESCRIPTION)
+    parameter: ParameterTables | None = Field(
+        None,
+        description=OWN_DESCRIPTION.format('"trajectory.amplitude.epsilon" or "limits.tension_max"', " and [axes]"),
+    )
     without: WithoutInSweeps | None = Field(
         None,
         description=f'{DESCRIPTION}; workspaces: "{ANY_ONE}", each single cable gone in turn, all must be feasible',
@@ -318,3 +330,8 @@ class SweepFile(ObstacleKeys, _SweepKeys):
         description="maps of arcs: [[obstacle]], bodies fixed in space that no motion may meet; workspaces have "
         "[[workspace.obstacle]]",
     )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _at_values(cls, data: Any, handler: ModelWrapValidatorHandler["SweepFile"]) -> "SweepFile":
+        return at_values(cls, data, handler, "sweep")

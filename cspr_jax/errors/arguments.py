@@ -144,9 +144,7 @@ File = Annotated[
     str | Path | Mapping[str, Any],
     Kind("the path of a file, or a dictionary of what it holds", (str, os.PathLike, Mapping)),
 ]
-Parameters = Annotated[
-    Mapping[str, float] | None, Kind("a dictionary of parameters of the robot and their values", (Mapping,))
-]
+Parameters = Annotated[Mapping[str, float] | None, Kind("a dictionary of parameters and their values", (Mapping,))]
 
 Divisions = Annotated[int, Integer(4, LARGEST_DIVISIONS)]
 Cables = Annotated[Sequence[int], Many(Integer(0, MAX_CABLES - 1), "a list of cables, from 0 on")]

@@ -160,9 +160,8 @@ def plan(path: Path) -> PlannedMotions:
 def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file's content."""
     legs_of = [FAMILIES[name].legs for name in plan_file.families]
-    robot_file = as_moved(
-        resolve_robot(plan_file.robot, path, path.parent, plan_file.parameters), legs_of, plan_file.without, path
-    )
+    robot_file = resolve_robot(plan_file.robot, path, path.parent, plan_file.parameters, plan_file.parameter)
+    robot_file = as_moved(robot_file, legs_of, plan_file.without, path)
     if plan_file.point == "origin":
         from cspr_jax.plans.given_points import with_mass_centres  # loads parts of SciPy
 

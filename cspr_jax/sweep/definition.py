@@ -99,7 +99,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     """Check the parsed content of a sweep file, without computing anything."""
     refuse_other_kinds(data, "sweep", path)
     spec = checked(SweepFile, data, path)
-    robot = resolve_robot(spec.robot, path, path.parent, spec.parameters)
+    robot = resolve_robot(spec.robot, path, path.parent, spec.parameters, spec.parameter)
     kind = MAP_KINDS[spec.map].of(spec.trajectory.family)
     check_map(kind, spec, path)
     robot = robot_of(robot, spec, kind, path)

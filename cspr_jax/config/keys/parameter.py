@@ -1,4 +1,4 @@
-"""Keys of parameters in robot files, and of their values in plans and sweeps."""
+"""Keys of parameters in robot, plan and sweep files, and of their values in plans and sweeps."""
 
 from typing import Annotated, Literal
 
@@ -15,11 +15,11 @@ MAX_PARAMETERS, MAX_MOVES = 100, 10_000
 MAX_ARRANGEMENTS = 10_000_000
 
 Value = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE)]
-# Values that a plan or a sweep gives to parameters of its robot.
+# Values that a plan or a sweep gives to its own parameters and to those of its robot.
 ParameterValues = Annotated[dict[str, Value], Field(min_length=1, max_length=MAX_PARAMETERS)]
 VALUES_DESCRIPTION = (
-    "{ NAME = value, ... }: values of parameters of the robot file; all others stay as in the file; of any platform "
-    "`arrangement`, the number of the permutation that leads its cables to their attachment points"
+    "{ NAME = value, ... }: values of parameters of this file and of the robot file; all others stay as in the files; "
+    "of any platform `arrangement`, the number of the permutation that leads its cables to their attachment points"
 )
 Cable = Annotated[int, Field(ge=0, lt=MAX_CABLES)]
 Number = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
@@ -67,3 +67,11 @@ class ParameterTable(Table):
             if multiple == 0.0:
                 raise table_error("moves", f"{target} = 0", "numbers that are not 0, so that it moves something")
         return self
+
+
+ParameterTables = Annotated[list[ParameterTable], Field(min_length=1, max_length=MAX_PARAMETERS)]
+# Parameters of plans and sweeps.
+OWN_DESCRIPTION = (
+    "[[parameter]], as in robot files but without scales: named numbers that move numbers of this file, such as {}, "
+    "not those of [robot]{}"
+)

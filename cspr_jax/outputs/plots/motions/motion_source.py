@@ -50,10 +50,8 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
     plan_file = read_plan(text, path)
-    robot_file, legs_of = (
-        resolve_robot(plan_file.robot, path, path.parent, plan_file.parameters),
-        [FAMILIES[n].legs for n in plan_file.families],
-    )
+    legs_of = [FAMILIES[name].legs for name in plan_file.families]
+    robot_file = resolve_robot(plan_file.robot, path, path.parent, plan_file.parameters, plan_file.parameter)
     robot_file = as_moved(robot_file, legs_of, plan_file.without, path)
     others = {"family": plan_file.family} | ({"z0": plan_file.z0} if isinstance(plan_file.z0, float) else {})
     return _with_robot_file(result, file, robot_file, path, others | {"plan": text})
