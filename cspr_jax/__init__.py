@@ -36,6 +36,7 @@ _MODULES = {
     "compare_log": "api.files.logs",
     "compute_sweep": "api.sweeps",
     "copy_examples": "api.files.listings",
+    "design": "api.designs",
     "ellipse": "api.families.ellipses",
     "ellipse_frequencies": "api.families.ellipses",
     "ellipse_margins": "api.families.ellipses",

@@ -2,6 +2,7 @@
 
 from cspr_jax.api.calibration import calibrate as calibrate
 from cspr_jax.api.checks import check as check
+from cspr_jax.api.designs import design as design
 from cspr_jax.api.elasticity import natural_frequencies as natural_frequencies
 from cspr_jax.api.elasticity import stiffness as stiffness
 from cspr_jax.api.families.beziers import bezier as bezier

@@ -5,9 +5,11 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from cspr_jax.config.design import DesignFile, Hall, ObjectiveTable, RequirementTable, SearchKeys
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.keys.obstacles import ObstacleTable
+from cspr_jax.config.keys.parameter import ParameterTable
 from cspr_jax.config.keys.path import PathTable, TargetPath
 from cspr_jax.config.keys.pose import Pose
 from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude
@@ -74,6 +76,14 @@ FILES = {
         ("amplitude, your own", PolynomialAmplitude),
     ],
     "Robot files": [("", RobotFile), ("[winch]", WinchTable)],
+    "Design files": [
+        ("", DesignFile),
+        ("[[objective]]", ObjectiveTable),
+        ("[[requirement]]", RequirementTable),
+        ("[[parameter]]", ParameterTable),
+        ("[hall]", Hall),
+        ("[search]", SearchKeys),
+    ],
 }
 
 HEAD = """# Reference

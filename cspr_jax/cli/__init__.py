@@ -14,6 +14,7 @@ from cspr_jax import __version__
 from cspr_jax.cli import (
     calibration,
     checks,
+    designs,
     listings,
     logs,
     machine,
@@ -188,6 +189,7 @@ def _complete_files(parser: argparse.ArgumentParser, files: dict[str, Any]) -> N
 COMMANDS = (
     *(
         *sweeps.COMMANDS,
+        *designs.COMMANDS,
         *plans.COMMANDS,
         *simulations.COMMANDS,
         *checks.COMMANDS,

@@ -36,7 +36,7 @@ def check_parameters(parameters: Sequence[ParameterTable], spec: Mapping[str, An
     for i, name in enumerate(names):
         if name in [*names[:i], ARRANGEMENT]:
             raise table_error(f"parameter[{i}].name", name, f"a name that no other parameter has, nor {ARRANGEMENT}")
-    numbers = [*dict(_numbers(spec)), *(key for key, points in SCALES.items() if spec.get(points) is not None)]
+    numbers = [*dict(numbers_in(spec)), *(key for key, points in SCALES.items() if spec.get(points) is not None)]
     targets = {*numbers, *(PARAMETER + name for name in names)}
     for i, parameter in enumerate(parameters):
         for target in parameter.moves:
@@ -245,14 +245,14 @@ def with_values(spec: dict[str, Any], values: Mapping[str, float] | None) -> dic
     return spec | {"parameters": {**(earlier if isinstance(earlier, Mapping) else {}), **values}}
 
 
-def _numbers(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
-    # All numbers of a parsed file, by their keys.
+def numbers_in(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    """All numbers of a parsed file, by their keys."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
-            yield from _numbers(inner, f"{key}.{name}" if key else name)
+            yield from numbers_in(inner, f"{key}.{name}" if key else name)
     elif isinstance(value, list):
         for i, inner in enumerate(value):
-            yield from _numbers(inner, f"{key}[{i}]")
+            yield from numbers_in(inner, f"{key}[{i}]")
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield key, value
 

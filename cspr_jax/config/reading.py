@@ -42,16 +42,19 @@ _LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{LONGEST_KE
 
 # Keys that only one kind of file has, and what that kind is.
 _DISTINCTIVE_KEYS = {
+    "design": ("objective",),
     "sweep": ("map", "axes", "trajectory", "run", "orientations"),
     "plan": ("pose",),
     "robot": ("base_points", "platform_points", "mass", "inertia"),
 }
 _EXPECTED = {
+    "design": "a design file, with [[objective]] tables",
     "sweep": "a sweep file, with map, [axes] and [trajectory]",
     "plan": "a plan file, with [[pose]] tables",
     "robot": "a robot file, with base_points and mass",
 }
 _USES = {
+    "design": "a design is computed by `cspr design`",
     "sweep": "a sweep is computed by `cspr run`",
     "plan": "a plan is computed by `cspr plan`",
     "robot": 'a robot file is named in a plan or sweep, robot = "FILE.toml"',

@@ -73,6 +73,12 @@ def axis_points(axis: AxisRange | list[float]) -> Float[np.ndarray, "n"]:
     return np.array(axis, float)
 
 
+def cell_widths(points: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Extents of the full cells about sorted points: the distance to the farther neighbour of each."""
+    gaps = np.diff(points)
+    return np.maximum(np.append(gaps, 0.0), np.append(0.0, gaps)) if len(points) else points
+
+
 _OF_TARGETS = (
     "{} of the targets, m: {{ start, stop, count }} or a list; of a platform those of its mass centre, in workspaces "
     "of the origin of its axes, unless point or workspace.point says otherwise"

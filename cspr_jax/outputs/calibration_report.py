@@ -299,9 +299,4 @@ def calibrated_text(result: Calibrated, spec: Mapping[str, Any], source: str) ->
     head += [f"not identifiable: {direction.text}" for direction in result.directions]
     if "offsets" in groups and not result.predictor.measurements.are_angles:
         head.append(f"add to measured lengths, m: {value_text(_rounded(estimate.setup.offsets))}")
-    plain = {key: value for key, value in spec.items() if not isinstance(value, dict)}
-    text = "".join(f"# {line}\n" for line in head) + robot_text(plain)
-    for key, table in spec.items():
-        if isinstance(table, dict):
-            text += f"\n[{key}]\n" + robot_text(table)
-    return text
+    return "".join(f"# {line}\n" for line in head) + robot_text(spec)

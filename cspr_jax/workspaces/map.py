@@ -13,7 +13,7 @@ from cspr_jax.build.robots import build_limits, build_robot
 from cspr_jax.build.scenes import build_scene
 from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile, axis_points
+from cspr_jax.config.sweep import SweepFile, axis_points, cell_widths
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.motion.given_limits import static_limits
@@ -22,7 +22,7 @@ from cspr_jax.numerics.linear.frames import Frame, frame_of
 from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.contacts.clearance import ContactPair, Scene
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.orientation_grids import cone_grid, equal_volume_grid, planar_grid
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -31,6 +31,7 @@ from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
 from cspr_jax.workspaces.cells.speeds import CableSpeeds, cable_speeds
+from cspr_jax.workspaces.clearances import at_rest
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.requirements import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
@@ -251,14 +252,21 @@ class WorkspaceMap(GridMap):
         origins = self._poses.origins(positions, quaternions)
         return self._robot, self._limits, mass_centres(self._robot, origins, quaternions), quaternions
 
+    def nearest(self, cells: dict[str, np.ndarray]) -> ContactPair | None:
+        """The two bodies that are nearest to each other at the first cell; None where contacts do not count."""
+        around = self._poses.around
+        if around is None:
+            return None
+        robot, _, centres, quaternions = self.at_rest(cells)
+        nearest = int(at_rest(robot, around, centres[:1], quaternions[:1]).nearest[0])
+        return around.contact_pairs[nearest] if nearest < len(around.contact_pairs) else None
+
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # Half of the extents (n, 3) of the cells: half of the distance to the farther neighbour along each axis.
         half_sizes = []
         for name in "xyz":
             points = np.sort(axis_points(getattr(self._keys.axes, name)))
-            gaps = np.diff(points)
-            farther = np.maximum(np.append(gaps, 0.0), np.append(0.0, gaps))
-            half_sizes.append(0.5 * farther[np.searchsorted(points, cells[name])])
+            half_sizes.append(0.5 * cell_widths(points)[np.searchsorted(points, cells[name])])
         return np.stack(half_sizes, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -12,17 +12,24 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.maps.grid_map import Coordinates, RobotAt, RobotsApartError
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.arrangements import arrangement_of
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.quantities import ARRANGEMENT, is_of_robot, parameter_values
 from cspr_jax.workspaces.map import WorkspaceMap
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.search import Poses
 from cspr_jax.workspaces.search_over_robots import RobotRows, RobotSamples, SearchOverRobots
 
 # Number of arrangements from which the structure of wrench matrices is taken.
 TRIED = 6
 # Largest number of parameters: samples are up to a power of three.
 MAX_PARAMETERS = 4
+# Number of samples of more parameters.
+MAX_SAMPLES = 60
+# A cable whose limit has less than this derivative does not decide a margin.
+SMALLEST_DERIVATIVE = 1e-9
 
 
 class WorkspacesOfRobots(WorkspaceMap):
@@ -32,11 +39,13 @@ class WorkspacesOfRobots(WorkspaceMap):
         RobotsApartError: conditions or robots are not such that they can be computed together.
     """
 
-    def __init__(self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Coordinates) -> None:
-        """Prepare the map from a few of the robots."""
+    def __init__(
+        self, robot_at: RobotAt, spec: SweepFile, file: object, axes: Coordinates, *, screens: bool = False
+    ) -> None:
+        """Prepare the map from a few of the robots; of one that only screens there may be any number of parameters."""
         points = {name: np.unique(axes[name]) for name in axes if is_of_robot(name) and name != ARRANGEMENT}
         self._names = [name for name in points if len(points[name]) > 1]
-        values = _sampled(points, self._names)
+        values = _sampled(points, self._names, screens=screens)
         super().__init__(robot_at(parameter_values(values[0])), spec, file)
         self._numbers = np.sort(axes[ARRANGEMENT]) if ARRANGEMENT in axes else None
         self._refuse_others(spec)
@@ -53,6 +62,35 @@ class WorkspacesOfRobots(WorkspaceMap):
             requirements = [required[name] for *_, required in samples]
             searches[name] = SearchOverRobots(RobotSamples(robots, requirements, table, tried))
         self._poses = dataclasses.replace(self._poses, searches=searches)
+
+    @property
+    def parameter_axes(self) -> list[str]:
+        """Names of the axes of parameters by which the robots differ, in the order of derivatives."""
+        return list(self._names)
+
+    def facets(self, cells: dict[str, np.ndarray]) -> tuple[Float[np.ndarray, "f n"], Float[np.ndarray, "k f n"]]:
+        """Margins of the conditions on the cables along each facet normal, and derivatives by the parameters."""
+        poses = self._poses_with_robots(cells)
+        parts = [cast("SearchOverRobots", search).facets(poses) for search in self._poses.searches.values()]
+        return np.concatenate([x for x, _ in parts]), np.concatenate([x for _, x in parts], axis=1)
+
+    def limits_of_facet(self, cells: dict[str, np.ndarray], facet: int) -> tuple[list[int], list[int]]:
+        """Cables that are at their smallest, and at their largest tension, where one facet normal has its margin."""
+        poses = self._poses_with_robots(cells)
+        for search in self._poses.searches.values():
+            one = cast("SearchOverRobots", search)
+            if facet < one.facet_count:
+                low, high = one.by_limits(poses, facet)
+                return np.flatnonzero(np.abs(low[:, 0]) > SMALLEST_DERIVATIVE).tolist(), np.flatnonzero(
+                    high[:, 0] > SMALLEST_DERIVATIVE
+                ).tolist()
+            facet -= one.facet_count
+        return [], []
+
+    def _poses_with_robots(self, cells: dict[str, np.ndarray]) -> Poses:
+        positions, quaternions = self._poses_of(cells)
+        centres = mass_centres(self._robot, self._poses.origins(positions, quaternions), quaternions)
+        return Poses(centres, quaternions, None, self._robots_of(cells))
 
     def _refuse_others(self, spec: SweepFile) -> None:
         poses, limits = self._poses, self._limits
@@ -79,15 +117,20 @@ class WorkspacesOfRobots(WorkspaceMap):
         return RobotRows(values, self._arrangements[np.searchsorted(self._numbers, cells[ARRANGEMENT])])
 
 
-def _sampled(points: dict[str, np.ndarray], names: list[str]) -> list[dict[str, float]]:
+def _sampled(points: dict[str, np.ndarray], names: list[str], *, screens: bool) -> list[dict[str, float]]:
     # Values of the samples: all smallest ones, the largest of each, then all choices of the smallest, the middle and
     # the largest, at which limits that are the smaller of two affine functions are seen to be no affine function.
-    if len(names) > MAX_PARAMETERS:
+    if len(names) > MAX_PARAMETERS and not screens:
         raise RobotsApartError
     first = {name: float(values[0]) for name, values in points.items()}
     singles = [first | {name: float(points[name][-1])} for name in names]
     three = [np.unique(points[name][[0, len(points[name]) // 2, -1]]).tolist() for name in names]
-    return [first, *singles, *(first | dict(zip(names, each, strict=True)) for each in itertools.product(*three))]
+    if len(names) <= MAX_PARAMETERS:
+        choices = list(itertools.product(*three))
+    else:
+        random = np.random.default_rng(0)
+        choices = [tuple(random.choice(each) for each in three) for _ in range(MAX_SAMPLES)]
+    return [first, *singles, *(first | dict(zip(names, each, strict=True)) for each in choices)]
 
 
 def _count(cells: dict[str, np.ndarray]) -> int:

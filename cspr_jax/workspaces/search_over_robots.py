@@ -7,8 +7,9 @@ batches are full whatever the number of poses of each robot, and are compiled on
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -20,11 +21,12 @@ from cspr_jax.maps.grid_map import RobotsApartError
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.tolerances import BOUNDARY
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
-from cspr_jax.workspaces.poses import geometry
-from cspr_jax.workspaces.poses.facet_normals import choices_of
+from cspr_jax.workspaces.poses import geometry, kernels
+from cspr_jax.workspaces.poses.facet_normals import CableSubsets, choices_of
 from cspr_jax.workspaces.poses.kernels import TensionLimits
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 from cspr_jax.workspaces.requirements import CLOSURE, Requirement
@@ -34,6 +36,10 @@ from cspr_jax.workspaces.search import BATCH, Constants, Poses, Stage, Workspace
 EQUAL, AFFINE = 1e-14, 1e-11
 # Largest ratio of the largest limits or weights of robots that share the distance from limits at which poses are open.
 LARGEST_RATIO = 1000.0
+# Number of poses whose derivatives are computed at a time.
+FACET_BATCH = 64
+# A limit of tensions that stands for none, over the largest of the other limits and required wrenches.
+VERY_LARGE = 1e6
 
 
 class RobotRows(NamedTuple):
@@ -213,6 +219,69 @@ class SearchOverRobots(WorkspaceSearch):
         values, attachments = poses.robots
         chosen = None if attachments is None else lanes(attachments, np.int32)
         return (lanes(poses.positions, dtype), quaternions), (lanes(values, dtype), chosen)
+
+    def facets(self, poses: Poses) -> tuple[Float[np.ndarray, "f n"], Float[np.ndarray, "k f n"]]:
+        """Margins along each facet normal, of which the margin is the smallest, and derivatives by the parameters."""
+        lanes = self._lanes(poses, np.float64)
+        values, derivatives = in_batches(self._facet_kernel, lanes, batch_size=FACET_BATCH, axis=-1)
+        return values, derivatives
+
+    @functools.cached_property
+    def _facet_kernel(self) -> Callable[..., Any]:
+        table = self._choices.table
+
+        def compiled(batch: Any) -> tuple[Array, Array]:
+            poses, (values, attachments) = batch
+
+            def margins(values: Sequence[Array]) -> Array:
+                return self._along(poses, (values, attachments), table)
+
+            ones, zeros = jnp.ones_like(poses[0][0]), jnp.zeros_like(poses[0][0])
+            tangents = [tuple(ones if i == k else zeros for i in range(len(values))) for k in range(len(values))]
+            parts = [jax.jvp(margins, (values,), (tangent,))[1] for tangent in tangents]
+            result = margins(values)
+            return result, jnp.stack(parts) if parts else jnp.zeros((0, *result.shape))
+
+        return jax.jit(compiled)
+
+    def _along(self, poses: Any, robots: Any, table: Any, changes: Any = (0.0, 0.0)) -> Array:
+        # Margins (f, n) along the facet normals of a table, with changed limits of tensions.
+        (positions, quaternions), length = poses, as_float64(self._length)
+        constants = constants_of_lanes(self._families[False], *robots)
+        columns, loss = geometry.wrench_columns(constants.robot, positions, quaternions, length)
+        low, high, measure = constants.limits
+        # Products of derivatives with an infinite limit have no value; with a very large one they have.
+        very_large = self._boundary / BOUNDARY * VERY_LARGE
+        low, high = (x.reshape(len(x), -1) + change for x, change in zip((low, high), changes, strict=True))
+        limits = TensionLimits(low, jnp.where(jnp.isinf(high), very_large, high), measure)
+
+        def along(row: Array) -> Array:
+            one: Any = CableSubsets(row[None], None)  # type: ignore[arg-type]
+            bounds = kernels.by_normals(
+                columns, loss, constants.wrenches, limits, one, measure=self._measure, is_bounded=True
+            )
+            return 0.5 * (jnp.real(bounds) + jnp.imag(bounds))
+
+        return jax.vmap(along)(table)
+
+    @property
+    def facet_count(self) -> int:
+        """Number of facet normals."""
+        return len(self._choices.table)
+
+    def by_limits(self, poses: Poses, facet: int) -> tuple[Float[np.ndarray, "c n"], Float[np.ndarray, "c n"]]:
+        """Derivatives of the margin along a facet normal by the smallest and by the largest tension of each cable."""
+        table = self._choices.table[facet][None]
+        inner, robots = self._lanes(poses, np.float64)
+        zeros = jnp.zeros((self.robot.n_cables, len(poses.positions)))
+
+        def margin(low: Array, high: Array) -> Array:
+            return self._along(inner, robots, table, (low, high))[0]
+
+        tangents = [zeros.at[cable].set(1.0) for cable in range(self.robot.n_cables)]
+        low = [jax.jvp(margin, (zeros, zeros), (tangent, zeros))[1] for tangent in tangents]
+        high = [jax.jvp(margin, (zeros, zeros), (zeros, tangent))[1] for tangent in tangents]
+        return np.stack(low), np.stack(high)
 
     def _problems(self, poses: Poses) -> Iterator[tuple[np.ndarray, RequiredWrenches, np.ndarray, np.ndarray]]:
         lanes = self._lanes(poses, np.float64)

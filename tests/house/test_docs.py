@@ -14,6 +14,7 @@ import pytest
 
 import cspr_jax
 from cspr_jax import cli
+from cspr_jax.config.design import read_design
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import read_robot
@@ -178,6 +179,8 @@ def test_files_in_sweeps_are_read():
     for path in sorted((ROOT / "sweeps").rglob("*.toml")):
         if {"pose", "path"} & set(read_toml(path)):
             assert len(checked(PlanFile, read_toml(path), path).pose) > 1
+        elif "objective" in read_toml(path):
+            assert read_design(path)[0].objective
         else:
             assert read_sweep(path).grid.n_cells > 0
 

@@ -16,7 +16,23 @@ def robot_text(spec: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
     lines = []
     if any(cable_names):
         lines.append("# cables: " + ", ".join(printable(name) for name in cable_names))
-    return "\n".join([*lines, *(f"{key} = {value_text(value)}" for key, value in spec.items())]) + "\n"
+    return "\n".join([*lines, *_lines(spec)]) + "\n"
+
+
+def _lines(spec: Mapping[str, Any]) -> list[str]:
+    # Tables and lists of tables come last, since all keys after them would belong to them.
+    lines = [f"{key} = {value_text(value)}" for key, value in spec.items() if not _tables_of(value)]
+    for key, value in spec.items():
+        head = f"[[{key}]]" if isinstance(value, list) else f"[{key}]"
+        for table in _tables_of(value):
+            lines += ["", head, *(f"{inner} = {value_text(item)}" for inner, item in table.items())]
+    return lines
+
+
+def _tables_of(value: Any) -> list[dict[str, Any]]:
+    if isinstance(value, dict):
+        return [value]
+    return value if isinstance(value, list) and value and all(isinstance(one, dict) for one in value) else []
 
 
 def value_text(value: Any) -> str:

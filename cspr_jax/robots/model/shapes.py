@@ -165,6 +165,19 @@ def is_within(shape: Body, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray,
     return out <= WITHIN
 
 
+def point_distances(shape: Obstacle, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """Distances of points from the surface of a shape, negative inside."""
+    if isinstance(shape, Sphere):
+        return np.linalg.norm(points - shape.centre, axis=1) - shape.radius
+    if isinstance(shape, Cylinder):
+        along = shape.end - shape.start
+        fraction = (points - shape.start) @ along / max(float(along @ along), np.finfo(float).tiny)
+        nearest = shape.start + np.clip(fraction, 0.0, 1.0)[:, None] * along
+        return np.linalg.norm(points - nearest, axis=1) - shape.radius
+    beyond = np.abs((points - shape.centre) @ shape.rotation) - shape.half
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(1), 0.0)
+
+
 def inward(shape: Obstacle, frame: Frame) -> Obstacle:
     """An obstacle of a robot file in the kernels' coordinates."""
     if isinstance(shape, Cylinder):

@@ -1,0 +1,90 @@
+"""Results of a design: robots with their numbers, proofs and sensitivities."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.design.evaluations import Evaluation, Evaluator
+from cspr_jax.design.proofs import RequirementProof
+from cspr_jax.design.questions import Question
+from cspr_jax.design.sensitivities import DesignSensitivities
+from cspr_jax.design.space import Point
+from cspr_jax.numerics.shapes import Float
+
+
+@dataclasses.dataclass(frozen=True)
+class DesignedRobot:
+    """A robot that a design found.
+
+    Fields:
+        name: name of its file, without the ending.
+        robot_file: the robot.
+        parameters: values of the parameters, by name.
+        arrangement: number of the arrangement of its cables.
+        values: (q,) numbers of the objectives, then of the requirements.
+        missed: by how much it misses the requirements, each as a fraction of its bound; 0: it meets all.
+        proofs: proofs of requirements in full cells.
+        sensitivities: derivatives, and what holds the parameters.
+        problem: why it has no numbers; empty where it has.
+    """
+
+    name: str
+    robot_file: RobotFile
+    parameters: dict[str, float]
+    arrangement: int
+    values: tuple[float, ...]
+    missed: float
+    proofs: tuple[RequirementProof, ...]
+    sensitivities: DesignSensitivities
+    problem: str = ""
+
+    @property
+    def is_feasible(self) -> bool:
+        """Tell whether it meets all requirements, with the proofs that are asked for."""
+        return self.missed == 0.0 and all(proof.is_whole for proof in self.proofs)
+
+
+@dataclasses.dataclass(frozen=True)
+class DesignSearch:
+    """The search of a design.
+
+    Fields:
+        file: path of the design file.
+        evaluator: robots, objectives, requirements, and the record of all evaluations.
+        robots: the best robot, or those of the Pareto front, from the best by the first objective on.
+        is_complete: whether the search came to its end.
+    """
+
+    file: Path
+    evaluator: Evaluator
+    robots: tuple[DesignedRobot, ...]
+    is_complete: bool
+
+    @property
+    def best(self) -> DesignedRobot:
+        """The best robot by the first objective."""
+        return self.robots[0]
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        """Objectives, then requirements."""
+        return self.evaluator.questions
+
+    @property
+    def evaluations(self) -> list[Evaluation]:
+        """All evaluations, in their order."""
+        return list(self.evaluator.record.values())
+
+    def values_of(self, name: str) -> Float[np.ndarray, "n"]:
+        """Values of a parameter in all evaluations."""
+        i = self.evaluator.space.names.index(name)
+        return np.array([one.point.values[i] for one in self.evaluations])
+
+
+def parameters_at(evaluator: Evaluator, point: Point) -> dict[str, float]:
+    """Values of the parameters at a point, by name."""
+    return dict(zip(evaluator.space.names, point.values, strict=True))

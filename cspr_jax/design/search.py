@@ -1,0 +1,189 @@
+"""The search of a design: screening, local searches from the best few, exact numbers, proofs; one objective or two."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from cspr_jax.config.design import SearchKeys
+from cspr_jax.design.counting import counted
+from cspr_jax.design.evaluations import FIRST, Evaluation, Evaluator, Goal, front_of
+from cspr_jax.design.evolution import evolved
+from cspr_jax.design.exchange import improved
+from cspr_jax.design.measures.measure import FRACTION
+from cspr_jax.design.proofs import RequirementProof, proofs_of
+from cspr_jax.design.questions import Question
+from cspr_jax.design.screening import screened, starts_of
+
+# Fractions of the largest margins that are kept in reserve, in turn, until full cells are proved.
+RESERVES = (1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
+# Number of times that the last step of these is halved.
+HALVINGS = 3
+# Local searches end where so many have found the same number, up to this fraction of it.
+AGREEING, AGREED = 2, 1e-6
+
+
+@dataclasses.dataclass
+class Progress:
+    """Hooks of a search.
+
+    Fields:
+        tell: called with a line at each stage.
+        stopped: tells whether to end with what there is.
+    """
+
+    tell: Callable[[str], None] = lambda line: None
+    stopped: Callable[[], bool] = lambda: False
+
+
+@dataclasses.dataclass(frozen=True)
+class Chosen:
+    """A robot that a search found.
+
+    Fields:
+        evaluation: its numbers.
+        proofs: proofs of its requirements, of those for which they are asked.
+        requirements: requirements with what is kept in reserve for proofs; empty: nothing is.
+    """
+
+    evaluation: Evaluation
+    proofs: tuple[RequirementProof, ...] = ()
+    requirements: tuple[Question, ...] = ()
+
+    @property
+    def is_proved(self) -> bool:
+        """Tell whether it meets all requirements, with all proofs that are asked for."""
+        return self.evaluation.missed == 0.0 and all(proof.is_whole for proof in self.proofs)
+
+
+def searched(evaluator: Evaluator, settings: SearchKeys, progress: Progress) -> list[Chosen]:
+    """The best robot; of two objectives those of the Pareto front, from the best by the first objective on."""
+    screened(evaluator, settings.screen, progress.stopped)
+    progress.tell(f"screened {len(evaluator.record)} robots{_best_words(evaluator)}")
+    best = _best(evaluator, settings, FIRST, progress)
+    if len(evaluator.objectives) == 1:
+        return [_proved(evaluator, settings, FIRST, best, progress)]
+    return _front(evaluator, settings, best, progress)
+
+
+def _best(evaluator: Evaluator, settings: SearchKeys, goal: Goal, progress: Progress) -> Evaluation:
+    # The best robot by one goal, by local searches from the best few robots so far.
+    starts = starts_of(evaluator, goal, settings.starts)
+    objective = evaluator.objectives[goal.objective]
+    questions = [objective, *evaluator.requirements]
+    questions += [evaluator.objectives[goal.other]] if math.isfinite(goal.level) else []
+    results = list(starts)
+    counts = objective.quantity == FRACTION and bool(objective.measure.slacks())
+    climb = improved if objective.is_smooth else counted if counts else None
+    for i, start in enumerate(starts if climb is not None and evaluator.space.names else ()):
+        if progress.stopped() or climb is None:
+            break
+        results.append(climb(evaluator, start.point, goal, progress.stopped))
+        if _agree(evaluator, results[len(starts) :], goal):  # further searches would find the same
+            break
+        best = min(results, key=lambda one: goal.rank(evaluator, one))
+        progress.tell(f"local search {i + 1} of {len(starts)}{_words(evaluator, best)}")
+    results.sort(key=lambda one: goal.rank(evaluator, one))
+    if evaluator.space.names and not progress.stopped() and not all(question.is_smooth for question in questions):
+        results.insert(0, evolved(evaluator, results, goal, settings.generations, progress.stopped))
+        progress.tell(f"differential evolution{_words(evaluator, results[0])}")
+    return evaluator.one(min(results, key=lambda one: goal.rank(evaluator, one)).point)
+
+
+def _agree(evaluator: Evaluator, results: list[Evaluation], goal: Goal) -> bool:
+    # Tell whether the two best of the local searches have met in one optimum.
+    if len(results) < AGREEING:
+        return False
+    first, second, *_ = sorted(goal.rank(evaluator, one) for one in results)
+    return first[0] == second[0] == 0.0 and abs(second[1] - first[1]) <= AGREED * abs(first[1])
+
+
+def _front(evaluator: Evaluator, settings: SearchKeys, first: Evaluation, progress: Progress) -> list[Chosen]:
+    # The best robots by each objective, and between them the best by one while the other stays above levels; of all
+    # robots that were evaluated on the way those that no other surpasses in both.
+    last = _best(evaluator, settings, Goal(1, other=0), progress)
+    # Levels of a number that jumps cost a search nothing, while it is hard to make large.
+    main = int(not evaluator.objectives[0].is_smooth and evaluator.objectives[1].is_smooth)
+    ends = sorted(evaluator.worth(one, 1 - main) for one in (first, last))
+    if first.missed == 0.0 and last.missed == 0.0 and all(map(math.isfinite, ends)):
+        few = settings.model_copy(update={"starts": 1})  # between robots that are known to be good
+        for level in np.linspace(ends[0], ends[1], settings.front)[1:-1]:
+            if progress.stopped():
+                break
+            _best(evaluator, few, Goal(main, float(level), 1 - main), progress)
+    chosen = _spread(evaluator, settings.front)
+    if not chosen:
+        return [Chosen(first)]
+    proved = [
+        _proved(evaluator, settings, Goal(main, evaluator.worth(one, 1 - main), 1 - main), one, progress)
+        for one in chosen
+    ]
+    return sorted(proved, key=lambda one: -evaluator.worth(one.evaluation, 0))
+
+
+def _spread(evaluator: Evaluator, count: int) -> list[Evaluation]:
+    # Robots of the front, at most so many, spread evenly by the first objective.
+    good = [one for one in evaluator.record.values() if one.missed == 0.0]
+    if not good:
+        return []
+    values = np.array([[evaluator.worth(one, i) for i in (0, 1)] for one in good])
+    front = [evaluator.one(one.point) for one, is_best in zip(good, front_of(values), strict=True) if is_best]
+    front = sorted((one for one in front if one.missed == 0.0), key=lambda one: -evaluator.worth(one, 0))
+    worths = np.array([evaluator.worth(one, 0) for one in front])
+    if len(front) <= count:
+        return front
+    nearest = [int(np.abs(worths - level).argmin()) for level in np.linspace(worths[0], worths[-1], count)]
+    return [front[i] for i in dict.fromkeys(nearest)]
+
+
+def _proved(evaluator: Evaluator, settings: SearchKeys, goal: Goal, best: Evaluation, progress: Progress) -> Chosen:
+    # The robot with its proofs; where these fail, one that keeps as little in reserve as they need.
+    chosen = Chosen(best, proofs_of(evaluator, best.point))
+    if chosen.is_proved or best.missed > 0.0 or not evaluator.space.names:
+        return chosen
+    open_ones = {proof.key for proof in chosen.proofs if not proof.is_whole}
+
+    def with_reserve(reserve: float) -> Chosen:
+        requirements = [
+            one.with_reserve(reserve, one.measure.columns(best.point)) if one.key in open_ones else one
+            for one in evaluator.requirements
+        ]
+        careful = evaluator.with_requirements(requirements)
+        point = improved(careful, best.point, goal, progress.stopped).point
+        evaluator.count += careful.count
+        there = Chosen(evaluator.one(point), proofs_of(evaluator, point), tuple(requirements))
+        progress.tell(f"proofs with {100.0 * reserve:.3g} % in reserve: {'all' if there.is_proved else 'some open'}")
+        return there
+
+    failed = 0.0
+    for reserve in RESERVES:
+        if progress.stopped():
+            return chosen
+        there = with_reserve(reserve)
+        if there.is_proved:
+            break
+        failed = reserve
+    else:
+        return chosen
+    low, high = failed, reserve
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if progress.stopped():
+            break
+        nearer = with_reserve(middle)
+        low, high, there = (low, middle, nearer) if nearer.is_proved else (middle, high, there)
+    return there
+
+
+def _words(evaluator: Evaluator, best: Evaluation) -> str:
+    pairs = zip(evaluator.questions, best.values, strict=True)
+    numbers = ", ".join(f"{question.name} {value:.6g}" for question, value in pairs if question.sense)
+    state = "" if best.missed == 0.0 else ", requirements missed"
+    return f"; best so far: {numbers}{state}" if math.isfinite(best.missed) else "; no robot so far"
+
+
+def _best_words(evaluator: Evaluator) -> str:
+    return _words(evaluator, min(evaluator.record.values(), key=lambda one: FIRST.rank(evaluator, one)))

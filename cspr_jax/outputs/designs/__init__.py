@@ -1,0 +1,1 @@
+"""Designs as JSON, as a table for people, and as robot files."""
