@@ -12,14 +12,14 @@ from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.config.design import checked_design
 from cspr_jax.config.reading import plain_values, read_toml
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.design.results import DesignedRobot, DesignSearch
-from cspr_jax.design.run import run_design
-from cspr_jax.design.search import Progress
 from cspr_jax.errors.arguments import File
 from cspr_jax.outputs.designs.files import designed_text, write_design
 from cspr_jax.outputs.designs.report import design_lines, design_object, design_table
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch
+from cspr_jax.synthesis.run import run_design
+from cspr_jax.synthesis.search import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

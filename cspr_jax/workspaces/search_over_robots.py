@@ -40,6 +40,9 @@ LARGEST_RATIO = 1000.0
 FACET_BATCH = 64
 # A limit of tensions that stands for none, over the largest of the other limits and required wrenches.
 VERY_LARGE = 1e6
+# Largest difference of the bounds of the margin along a facet normal, over the largest limit or required wrench; and by
+# how much that is more with limits that stand for none.
+FACET_ERROR, OF_VERY_LARGE = 1e-5, 100.0
 
 
 class RobotRows(NamedTuple):
@@ -244,6 +247,11 @@ class SearchOverRobots(WorkspaceSearch):
 
         return jax.jit(compiled)
 
+    @property
+    def _facet_error(self) -> float:
+        magnitude = self._boundary / BOUNDARY
+        return FACET_ERROR * magnitude * (1.0 if np.isfinite(self.requirement.high).all() else OF_VERY_LARGE)
+
     def _along(self, poses: Any, robots: Any, table: Any, changes: Any = (0.0, 0.0)) -> Array:
         # Margins (f, n) along the facet normals of a table, with changed limits of tensions.
         (positions, quaternions), length = poses, as_float64(self._length)
@@ -260,7 +268,9 @@ class SearchOverRobots(WorkspaceSearch):
             bounds = kernels.by_normals(
                 columns, loss, constants.wrenches, limits, one, measure=self._measure, is_bounded=True
             )
-            return 0.5 * (jnp.real(bounds) + jnp.imag(bounds))
+            lower, upper = jnp.real(bounds), jnp.imag(bounds)
+            # Cables that depend on each other have no normal but rounding; other cables have all facets.
+            return jnp.where(upper - lower <= self._facet_error, 0.5 * (lower + upper), jnp.inf)
 
         return jax.vmap(along)(table)
 

@@ -25,7 +25,7 @@ FLOORS = (
     ("families",),
     ("machine",),
     ("plans", "sweep", "bench"),
-    ("design",),
+    ("synthesis",),
     ("outputs",),
     ("published", "outputs.plots"),
     ("api",),
@@ -50,7 +50,7 @@ KERNELS = (
     "machine",
 )
 # What a folder is about, what it rests on, and its files in the order in which they are read, stand in its guide.
-GUIDES = ("motion", "verification", "launch", "curves", "workspaces", "machine", "design", *FAMILIES)
+GUIDES = ("motion", "verification", "launch", "curves", "workspaces", "machine", "synthesis", *FAMILIES)
 # Tables of rows: to split one hides rows and shortens nothing. They may have more than 400 lines.
 TABLES = ("schema.map_kinds", "schema.quantities")
 LARGEST_FOLDER = 16

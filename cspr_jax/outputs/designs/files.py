@@ -7,11 +7,11 @@ from pathlib import Path
 
 from cspr_jax import __version__
 from cspr_jax.config.formats.writing import robot_text
-from cspr_jax.design.results import DesignedRobot, DesignSearch
 from cspr_jax.errors import printable
 from cspr_jax.outputs.designs.report import design_object, number, question_words, state_words, unit_of
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch
 
 NUMBERS = "design.json"
 

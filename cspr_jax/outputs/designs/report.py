@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cspr_jax.design.measures.maps import MapMeasure
-from cspr_jax.design.questions import Question
-from cspr_jax.design.results import DesignedRobot, DesignSearch
 from cspr_jax.outputs.plan_report import finite
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.plan_fields import SEGMENT
 from cspr_jax.schema.quantities import ARRANGEMENT, QUANTITIES
+from cspr_jax.synthesis.measures.maps import MapMeasure
+from cspr_jax.synthesis.questions import Question
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch
 
 SCHEMA = 1
 # Units of sizes of frames; digits in tables.

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.design.results import DesignSearch
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.designs.report import unit_of
 from cspr_jax.outputs.plots.robots.robot_at import hull_of
 from cspr_jax.outputs.plots.style.labels import COLOURS
 from cspr_jax.outputs.plots.style.scene import set_space
+from cspr_jax.synthesis.results import DesignSearch
 
 WIDTH, HEIGHT = 10.0, 4.6  # inches
 GREY, FAINT = "#9aa1a9", "#ccd1d6"

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from importlib.resources import files
 
 from cspr_jax import __version__
-from cspr_jax.design.results import DesignSearch
 from cspr_jax.outputs.designs.report import design_lines, number, question_words, state_words, unit_of
 from cspr_jax.schema.quantities import ARRANGEMENT
+from cspr_jax.synthesis.results import DesignSearch
 
 _STYLE = (
     "table.numbers { border-collapse: collapse; margin: 0 0 1.4rem; font-variant-numeric: tabular-nums; }"

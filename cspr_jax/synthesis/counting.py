@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.design.evaluations import Evaluation, Evaluator, Goal
-from cspr_jax.design.measures.measure import SMALLEST_FACET
-from cspr_jax.design.questions import Piece, Question, pieces_of
-from cspr_jax.design.space import Point, UnsuitableRobotError
+from cspr_jax.synthesis.evaluations import Evaluation, Evaluator, Goal
+from cspr_jax.synthesis.measures.measure import SMALLEST_FACET
+from cspr_jax.synthesis.questions import Piece, Question, pieces_of
+from cspr_jax.synthesis.space import Point, UnsuitableRobotError
 
 # Widths of steps in turn, as fractions of the spread of the margins.
 WIDTHS = (0.3, 0.1, 0.03, 0.01)

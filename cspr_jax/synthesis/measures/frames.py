@@ -8,12 +8,12 @@ import numpy as np
 
 from cspr_jax.config.design import Hall
 from cspr_jax.config.parameters import numbers_in
-from cspr_jax.design.measures.measure import Columns, Measure
-from cspr_jax.design.space import Point, RobotSpace
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.shapes import Int
 from cspr_jax.robots.model.shapes import point_distances
+from cspr_jax.synthesis.measures.measure import Columns, Measure
+from cspr_jax.synthesis.space import Point, RobotSpace
 
 CLEARANCE = "clearance"
 _EXTENTS = ("extent_x", "extent_y", "extent_z")

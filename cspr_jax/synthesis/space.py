@@ -15,7 +15,7 @@ from cspr_jax.config.design import DesignFile
 from cspr_jax.config.keys.parameter import ParameterTable
 from cspr_jax.config.parameters import moved
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.schema.quantities import ARRANGEMENT
@@ -141,7 +141,7 @@ def space_of(design: DesignFile, content: Mapping[str, Any], file: Path) -> Robo
         if name not in tables:
             hint = did_you_mean(name, tables)
             allowed = f"{hint}one of {', '.join(tables)}" if tables else "absent: there is no [[parameter]]"
-            raise ConfigError(file, f"parameters[{i}] = {shown(name)}: must be {allowed}")
+            raise ConfigError(file, f"parameters[{i}] = {shown(name)}: {demand(allowed)}")
         if name in names[:i]:
             raise ConfigError(file, f"parameters[{i}] = {shown(name)}: must be named once")
     arrangements: tuple[int, ...] = (0,)

@@ -1,4 +1,4 @@
-"""Design: the best robot among those that parameters and arrangements of the cables give.
+"""Dimensional synthesis: the best robot among those that parameters and arrangements of the cables give.
 
 A design file names what is better (objectives) and what must hold (requirements): numbers of maps, of plans, of the
 frame, of a hall. A search screens points of a Sobol sequence and all arrangements, improves the best few, evaluates

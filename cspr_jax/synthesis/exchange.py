@@ -14,10 +14,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cspr_jax.design.evaluations import FIRST, Evaluation, Evaluator, Goal
-from cspr_jax.design.questions import Piece, pieces_of
-from cspr_jax.design.space import Point, UnsuitableRobotError
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal
+from cspr_jax.synthesis.questions import Piece, pieces_of
+from cspr_jax.synthesis.space import Point, UnsuitableRobotError
 
 # Half of the edge of the box about the best robot so far, as a fraction of the ranges, at first and at last.
 BOX, SMALLEST_BOX = 0.3, 1e-7

@@ -8,8 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from cspr_jax.design.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.numerics.shapes import Float, Int
+from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 
 # Step of differences, as a fraction of the range of a parameter.
 STEP = 1e-6
@@ -91,5 +91,6 @@ class Measure(abc.ABC):
         for i, fraction in enumerate(fractions):
             step = STEP if fraction < 0.5 else -STEP
             there = self.space.point(fractions + step * (np.arange(len(fractions)) == i), point.arrangement)
-            derivatives[:, i] = (self.columns(there)[quantity][cells] - values) / step
+            with np.errstate(invalid="ignore"):  # margins without limits are infinite at both
+                derivatives[:, i] = (self.columns(there)[quantity][cells] - values) / step
         return values, np.nan_to_num(derivatives, posinf=0.0, neginf=0.0)

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cspr_jax.config.design import QuantityKeys
-from cspr_jax.design.measures.measure import FEASIBLE, FRACTION, SMALLEST_FACET, Columns, Measure
-from cspr_jax.design.space import Point
 from cspr_jax.numerics.shapes import Float, Int
+from cspr_jax.synthesis.measures.measure import FEASIBLE, FRACTION, SMALLEST_FACET, Columns, Measure
+from cspr_jax.synthesis.space import Point
 
 _REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
     "smallest": lambda values: float(np.min(values)),

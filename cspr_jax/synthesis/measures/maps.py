@@ -12,8 +12,6 @@ import numpy as np
 
 from cspr_jax.config.reading import checked, json_text
 from cspr_jax.config.sweep import SweepFile, axis_points, cell_widths
-from cspr_jax.design.measures.measure import FEASIBLE, FRACTION, Columns, Measure
-from cspr_jax.design.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.batches import in_threads, short_batches
@@ -24,6 +22,8 @@ from cspr_jax.sweep.checks import is_asked
 from cspr_jax.sweep.definition import Sweep, sweep_of
 from cspr_jax.sweep.robots import robot_of
 from cspr_jax.sweep.tile import TileMap
+from cspr_jax.synthesis.measures.measure import FEASIBLE, FRACTION, Columns, Measure
+from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.workspaces.map import WorkspaceMap
 
 # Margins of maps of motions; those of workspaces are `workspaces.static_poses.MARGINS`.

@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from cspr_jax.design.evaluations import Evaluator
-from cspr_jax.design.measures.maps import MapMeasure
-from cspr_jax.design.space import Point
+from cspr_jax.synthesis.evaluations import Evaluator
+from cspr_jax.synthesis.measures.maps import MapMeasure
+from cspr_jax.synthesis.space import Point
 
 INSIDE = 1
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.plan import checked_plan
-from cspr_jax.design.measures.measure import FEASIBLE, Columns, Measure
-from cspr_jax.design.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.shapes import Int
 from cspr_jax.plans.planning import PlannedMotions, plan_of
 from cspr_jax.schema.limits import LIMITS
+from cspr_jax.synthesis.measures.measure import FEASIBLE, Columns, Measure
+from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 
 _OF_ANSWERS = ("arcs", "duration", "margin", "margin_bound", "limit_margin", "tolerated")
 _OF_PEAKS = {row.name: row.peak for row in LIMITS if row.peak} | {

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from cspr_jax.design.evaluations import Evaluator
-from cspr_jax.design.questions import Piece, pieces_of
-from cspr_jax.design.space import AT_BOUND, Point, UnsuitableRobotError
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.synthesis.evaluations import Evaluator
+from cspr_jax.synthesis.questions import Piece, pieces_of
+from cspr_jax.synthesis.space import AT_BOUND, Point, UnsuitableRobotError
 
 # Functions are active within this change of a parameter, as a fraction of its range, from what they may not pass.
 ACTIVE = 1e-4
@@ -121,10 +121,11 @@ def _held(
     residual = float(np.abs(np.stack(columns, axis=1)[:-1] @ weights).max(initial=0.0))
     holdings = list[Holding]()
     pieces = [*((one, magnitude) for one in levels), *zip(others, norms, strict=True)]
-    for k, ((one, norm), weight) in enumerate(zip(pieces, weights, strict=True)):
-        if len(levels) == 1 and k == 0:  # the objective itself, which the others hold
-            continue
-        if weight <= WEIGHT * weights.max(initial=0.0):
+    is_active = weights > WEIGHT * weights.max(initial=0.0)
+    if is_active[: len(levels)].sum() == 1:  # the objective itself, which the others hold
+        is_active[: len(levels)] = False
+    for (one, norm), weight, takes_part in zip(pieces, weights, is_active, strict=True):
+        if not takes_part:
             continue
         prices = weight * one.derivative * magnitude / norm / ranges
         for i in np.flatnonzero(np.abs(prices) > WEIGHT * np.abs(prices).max(initial=0.0)):

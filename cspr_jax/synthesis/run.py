@@ -8,14 +8,14 @@ from typing import Any
 
 from cspr_jax import __version__
 from cspr_jax.config.design import DesignFile
-from cspr_jax.design.evaluations import Evaluator
-from cspr_jax.design.problem import evaluator_of
-from cspr_jax.design.record import opened
-from cspr_jax.design.results import DesignedRobot, DesignSearch, parameters_at
-from cspr_jax.design.search import Chosen, Progress, searched
-from cspr_jax.design.sensitivities import sensitivities_of
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
+from cspr_jax.synthesis.evaluations import Evaluator
+from cspr_jax.synthesis.problem import evaluator_of
+from cspr_jax.synthesis.record import opened
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, parameters_at
+from cspr_jax.synthesis.search import Chosen, Progress, searched
+from cspr_jax.synthesis.sensitivities import sensitivities_of
 
 # Version of what is searched, and how: results of another one are not mixed.
 METHOD = 1

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.design.measures.maps import MapMeasure, with_verdicts
-from cspr_jax.design.measures.measure import SMALLEST_FACET, Columns
-from cspr_jax.design.space import Point, RobotSpace
 from cspr_jax.maps.grid_map import RobotsApartError
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.schema.quantities import ARRANGEMENT, PARAMETER
 from cspr_jax.sweep.robots import robot_at
+from cspr_jax.synthesis.measures.maps import MapMeasure, with_verdicts
+from cspr_jax.synthesis.measures.measure import SMALLEST_FACET, Columns
+from cspr_jax.synthesis.space import Point, RobotSpace
 from cspr_jax.workspaces.map_over_robots import WorkspacesOfRobots
 
 # Number of cells whose robots are lanes at a time.

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.design.evaluations import Evaluation, Evaluator
-from cspr_jax.design.proofs import RequirementProof
-from cspr_jax.design.questions import Question
-from cspr_jax.design.sensitivities import DesignSensitivities
-from cspr_jax.design.space import Point
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.synthesis.evaluations import Evaluation, Evaluator
+from cspr_jax.synthesis.proofs import RequirementProof
+from cspr_jax.synthesis.questions import Question
+from cspr_jax.synthesis.sensitivities import DesignSensitivities
+from cspr_jax.synthesis.space import Point
 
 
 @dataclasses.dataclass(frozen=True)

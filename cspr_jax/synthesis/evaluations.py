@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from cspr_jax.design.measures.measure import FEASIBLE, Columns, Measure
-from cspr_jax.design.questions import ROUNDING, Question
-from cspr_jax.design.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.numerics.shapes import Bool, Float
+from cspr_jax.synthesis.measures.measure import FEASIBLE, Columns, Measure
+from cspr_jax.synthesis.questions import ROUNDING, Question
+from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 
 # An objective without a value counts so much among requirements that are missed.
 NO_OBJECTIVE = 1.0

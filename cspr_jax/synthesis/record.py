@@ -10,13 +10,13 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from cspr_jax.design.evaluations import Evaluation, Evaluator
-from cspr_jax.design.space import Point
 from cspr_jax.errors import RefusedError, StoreError, printable
 from cspr_jax.schema.quantities import ARRANGEMENT
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish, refusal
 from cspr_jax.store.folder import RunFolder
+from cspr_jax.synthesis.evaluations import Evaluation, Evaluator
+from cspr_jax.synthesis.space import Point
 
 TABLE, IDENTITY = "evaluations.csv", "identity.json"
 _LAST = ("missed", "slack", "screened", "problem")

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cspr_jax.design.evaluations import FIRST, Evaluation, Evaluator, Goal
-from cspr_jax.design.space import Point
+from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal
+from cspr_jax.synthesis.space import Point
 
 # Robots that are screened for each parameter, where a file does not say how many.
 EACH = 16

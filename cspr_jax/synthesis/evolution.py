@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cspr_jax.design.evaluations import Evaluation, Evaluator, Goal
+from cspr_jax.synthesis.evaluations import Evaluation, Evaluator, Goal
 
 # Members for each parameter, and the fewest that differential evolution takes.
 MEMBERS, FEWEST = 5, 6

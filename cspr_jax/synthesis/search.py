@@ -9,14 +9,14 @@ from collections.abc import Callable
 import numpy as np
 
 from cspr_jax.config.design import SearchKeys
-from cspr_jax.design.counting import counted
-from cspr_jax.design.evaluations import FIRST, Evaluation, Evaluator, Goal, front_of
-from cspr_jax.design.evolution import evolved
-from cspr_jax.design.exchange import improved
-from cspr_jax.design.measures.measure import FRACTION
-from cspr_jax.design.proofs import RequirementProof, proofs_of
-from cspr_jax.design.questions import Question
-from cspr_jax.design.screening import screened, starts_of
+from cspr_jax.synthesis.counting import counted
+from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal, front_of
+from cspr_jax.synthesis.evolution import evolved
+from cspr_jax.synthesis.exchange import improved
+from cspr_jax.synthesis.measures.measure import FRACTION
+from cspr_jax.synthesis.proofs import RequirementProof, proofs_of
+from cspr_jax.synthesis.questions import Question
+from cspr_jax.synthesis.screening import screened, starts_of
 
 # Fractions of the largest margins that are kept in reserve, in turn, until full cells are proved.
 RESERVES = (1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)

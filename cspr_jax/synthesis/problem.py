@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.config.design import FRAME, HALL, PARAMETERS, ROBOT, DesignFile, QuantityKeys
-from cspr_jax.design.evaluations import Evaluator
-from cspr_jax.design.measures.frames import FrameMeasure, HallMeasure, ParametersMeasure, RobotMeasure
-from cspr_jax.design.measures.maps import MapMeasure
-from cspr_jax.design.measures.measure import Measure
-from cspr_jax.design.measures.plans import PlanMeasure
-from cspr_jax.design.measures.workspaces import WorkspaceMeasure
-from cspr_jax.design.questions import Question, question_of
-from cspr_jax.design.space import RobotSpace, space_of
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import RobotsApartError
+from cspr_jax.synthesis.evaluations import Evaluator
+from cspr_jax.synthesis.measures.frames import FrameMeasure, HallMeasure, ParametersMeasure, RobotMeasure
+from cspr_jax.synthesis.measures.maps import MapMeasure
+from cspr_jax.synthesis.measures.measure import Measure
+from cspr_jax.synthesis.measures.plans import PlanMeasure
+from cspr_jax.synthesis.measures.workspaces import WorkspaceMeasure
+from cspr_jax.synthesis.questions import Question, question_of
+from cspr_jax.synthesis.space import RobotSpace, space_of
 
 
 def evaluator_of(design: DesignFile, content: Mapping[str, Any], file: Path) -> Evaluator:
