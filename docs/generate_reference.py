@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from cspr_jax.config.design import DesignFile, Hall, ObjectiveTable, RequirementTable, SearchKeys
+from cspr_jax.config.design import DesignFile, Hall, ObjectiveTable, ReconfigureKeys, RequirementTable, SearchKeys
 from cspr_jax.config.keys.launch import LaunchSearch
 from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.keys.obstacles import ObstacleTable
@@ -82,6 +82,7 @@ FILES = {
         ("[[requirement]]", RequirementTable),
         ("[[parameter]]", ParameterTable),
         ("[hall]", Hall),
+        ("[reconfigure]", ReconfigureKeys),
         ("[search]", SearchKeys),
     ],
 }

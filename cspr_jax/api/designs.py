@@ -17,7 +17,7 @@ from cspr_jax.outputs.designs.files import designed_text, write_design
 from cspr_jax.outputs.designs.report import design_lines, design_object, design_table
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
-from cspr_jax.synthesis.results import DesignedRobot, DesignSearch
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting
 from cspr_jax.synthesis.run import run_design
 from cspr_jax.synthesis.search import Progress
 
@@ -49,6 +49,16 @@ class Design(Pictured):
     def best(self) -> DesignedRobot:
         """The best robot by the first objective."""
         return self.robots[0]
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """Settings with the fewest changes between tasks, and their robots; none without [reconfigure]."""
+        return self._search.settings
+
+    @property
+    def alone(self) -> tuple[Setting, ...]:
+        """The best setting for each task alone."""
+        return self._search.alone
 
     @property
     def feasible(self) -> bool:

@@ -16,10 +16,10 @@ from cspr_jax.config.wording import table_error
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import did_you_mean
 
-MAX_QUESTIONS, MAX_TABLES = 100, 20
+MAX_QUESTIONS, MAX_TABLES, MAX_TASKS = 100, 20, 10
 # Tables of quantities beside maps and plans.
-FRAME, HALL, ROBOT, PARAMETERS = "frame", "hall", "robot", "parameters"
-_RESERVED = (FRAME, HALL, ROBOT, PARAMETERS)
+FRAME, HALL, ROBOT, PARAMETERS, TASKS = "frame", "hall", "robot", "parameters", "tasks"
+_RESERVED = (FRAME, HALL, ROBOT, PARAMETERS, TASKS)
 _NAME = r"^[A-Za-z][A-Za-z0-9_-]*$"
 Reduction = Literal["smallest", "largest", "mean", "sum"]
 Name = Annotated[str, Field(pattern=_NAME, max_length=60)]
@@ -101,6 +101,17 @@ class Hall(Table):
         return self
 
 
+class ReconfigureKeys(Table):
+    """Parameters that may differ from task to task, such as positions of spools on rails."""
+
+    parameters: Annotated[list[str], Field(min_length=1, max_length=MAX_PARAMETERS)] = Field(
+        description="parameters of the robot file that may be set anew before a task"
+    )
+    tasks: Annotated[list[Name], Field(min_length=2, max_length=MAX_TASKS)] = Field(
+        description='maps and plans in the order in which they are done; of = "tasks" means all of them'
+    )
+
+
 class SearchKeys(Table):
     """How much is tried."""
 
@@ -141,6 +152,9 @@ class DesignFile(Table):
         {}, description='[plans.NAME]: { file = "PLAN.toml" }, or the keys of a plan; the robot is that of the design'
     )
     hall: Hall | None = Field(None, description="where spools may be")
+    reconfigure: ReconfigureKeys | None = Field(
+        None, description="parameters with a value for each task, or for tasks in a row; as few changes as can be"
+    )
     objective: Annotated[list[ObjectiveTable], Field(min_length=1, max_length=2)] = Field(
         description="one objective, or two, of which a Pareto front is found"
     )
@@ -169,8 +183,23 @@ class DesignFile(Table):
                 if one.of not in names:
                     allowed = f"{did_you_mean(one.of, names)}one of {', '.join(names)}"
                     raise table_error(f"{key}[{i}].of", shown(one.of), allowed)
-                if one.of == HALL and self.hall is None:
-                    raise table_error(f"{key}[{i}].of", HALL, "another table: there is no [hall]")
+                absent = {HALL: (self.hall, "hall"), TASKS: (self.reconfigure, "reconfigure")}
+                value, needed = absent.get(one.of, (one, ""))
+                if value is None:
+                    raise table_error(f"{key}[{i}].of", one.of, f"another table: there is no [{needed}]")
+        return self
+
+    @model_validator(mode="after")
+    def _are_tasks(self) -> "DesignFile":
+        if self.reconfigure is None:
+            return self
+        names = [*self.maps, *self.plans]
+        for i, name in enumerate(self.reconfigure.tasks):
+            if name not in names or name in self.reconfigure.tasks[:i]:
+                allowed = f"{did_you_mean(name, names)}one of {', '.join(names)}, each once"
+                raise table_error(f"reconfigure.tasks[{i}]", shown(name), allowed)
+        if len(self.objective) > 1:
+            raise table_error("objective", f"{len(self.objective)} tables", "one beside [reconfigure]")
         return self
 
 

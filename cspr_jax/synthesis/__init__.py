@@ -20,8 +20,9 @@ Files, each importing only from those above it:
     proofs          proofs of requirements in full cells
     search          one objective, or the front of two
     sensitivities   derivatives, and what holds the parameters
+    problem         a design file as robots, measures and questions
+    reconfiguration  settings for tasks, with as few changes as can be
     results         robots that were found
     record          the directory in which a design is resumed
-    problem         a design file as robots, measures and questions
     run             from a file to its robots
 """

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 
 from cspr_jax.synthesis.evaluations import Evaluator
-from cspr_jax.synthesis.measures.maps import MapMeasure
 from cspr_jax.synthesis.space import Point
 
 INSIDE = 1
@@ -39,7 +38,7 @@ def proofs_of(evaluator: Evaluator, point: Point) -> tuple[RequirementProof, ...
     """Proofs of the requirements that ask for them, at the robot of a point."""
     proofs = []
     for question in evaluator.requirements:
-        if question.prove and isinstance(question.measure, MapMeasure):
+        if question.prove:
             sides = question.measure.sides(point)
             proofs.append(RequirementProof(question.key, question.name, len(sides), int(np.sum(sides == INSIDE))))
     return tuple(proofs)

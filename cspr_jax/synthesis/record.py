@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cspr_jax.errors import RefusedError, StoreError, printable
+from cspr_jax.schema.identity import digest
 from cspr_jax.schema.quantities import ARRANGEMENT
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish, refusal
@@ -29,15 +30,22 @@ class DesignRecord:
     def __init__(self, folder: RunFolder, disk: Disk) -> None:
         """Keep the directory."""
         self.path, self._folder, self._disk = folder.path, folder, disk
-        self._evaluator: Evaluator | None = None
 
-    def take_up(self, evaluator: Evaluator) -> int:
-        """Give an evaluator what an earlier process found; return the number of these evaluations."""
-        self._evaluator = evaluator
-        table = self.path / TABLE
-        if not table.exists():
-            self._append([header(evaluator)])
-            return 0
+    def take_up(self, evaluator: Evaluator, groups: str = "") -> int:
+        """Give an evaluator what an earlier process found, and keep what it finds; return how many there were.
+
+        Evaluators of several divisions into groups have tables of their own.
+        """
+        table = self.path / (f"evaluations-{digest(groups)[:12]}.csv" if groups else TABLE)
+        count = self._read(table, evaluator) if table.exists() else self._append(table, [header(evaluator)])
+
+        def keep(new: list[Evaluation]) -> None:
+            self._append(table, [words_of(evaluator, one) for one in new])
+
+        evaluator.on_new = keep
+        return count
+
+    def _read(self, table: Path, evaluator: Evaluator) -> int:
         count, complete = 0, _whole_lines(table)
         lines = list(csv.reader(io.StringIO(complete, newline="")))
         if not lines or lines[0] != header(evaluator):
@@ -55,19 +63,16 @@ class DesignRecord:
             publish(self._disk, table, complete.encode())
         return count
 
-    def add(self, evaluations: list[Evaluation]) -> None:
-        """Append evaluations."""
-        if self._evaluator is not None:
-            self._append([words_of(self._evaluator, one) for one in evaluations])
-
-    def _append(self, rows: list[list[str]]) -> None:
+    def _append(self, table: Path, rows: list[list[str]]) -> int:
+        # Append lines; none of them counts as one of an earlier process.
         text = io.StringIO(newline="")
         csv.writer(text, lineterminator="\n").writerows(rows)
         self._folder.check_held()
         try:
-            self._disk.append(self.path / TABLE, text.getvalue().encode())
+            self._disk.append(table, text.getvalue().encode())
         except OSError as error:
-            raise refusal(self.path / TABLE, error) from error
+            raise refusal(table, error) from error
+        return 0
 
 
 @contextlib.contextmanager

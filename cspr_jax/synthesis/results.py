@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.design import DesignFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.synthesis.evaluations import Evaluation, Evaluator
@@ -49,20 +50,46 @@ class DesignedRobot:
 
 
 @dataclasses.dataclass(frozen=True)
+class Setting:
+    """A setting of a robot for tasks in a row.
+
+    Fields:
+        name: name of its file, without the ending.
+        tasks: the tasks.
+        robot_file: the robot as it is set.
+        parameters: values of all parameters, by name.
+        value: number of the objective: of all tasks together, or of a task alone.
+    """
+
+    name: str
+    tasks: tuple[str, ...]
+    robot_file: RobotFile
+    parameters: dict[str, float]
+    value: float
+
+
+@dataclasses.dataclass(frozen=True)
 class DesignSearch:
     """The search of a design.
 
     Fields:
         file: path of the design file.
+        design: its content.
         evaluator: robots, objectives, requirements, and the record of all evaluations.
         robots: the best robot, or those of the Pareto front, from the best by the first objective on.
         is_complete: whether the search came to its end.
+        settings: settings of the best robot with as few changes as can be, where some parameters may differ from task
+            to task.
+        alone: the best setting for each task alone.
     """
 
     file: Path
+    design: DesignFile
     evaluator: Evaluator
     robots: tuple[DesignedRobot, ...]
     is_complete: bool
+    settings: tuple[Setting, ...] = ()
+    alone: tuple[Setting, ...] = ()
 
     @property
     def best(self) -> DesignedRobot:

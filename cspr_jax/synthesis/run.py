@@ -11,9 +11,11 @@ from cspr_jax.config.design import DesignFile
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.synthesis.evaluations import Evaluator
-from cspr_jax.synthesis.problem import evaluator_of
+from cspr_jax.synthesis.measures.groups import GroupedSpace
+from cspr_jax.synthesis.problem import Problem
+from cspr_jax.synthesis.reconfiguration import Division, reconfigured
 from cspr_jax.synthesis.record import opened
-from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, parameters_at
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting, parameters_at
 from cspr_jax.synthesis.search import Chosen, Progress, searched
 from cspr_jax.synthesis.sensitivities import sensitivities_of
 
@@ -31,36 +33,72 @@ def run_design(
 ) -> DesignSearch:
     """Search, from what an earlier process left in the directory on, and write what was found there."""
     with double_precision():
-        evaluator = evaluator_of(design, content, file)
-        with opened(directory, identity_of(content, evaluator), file) as record:
-            count = record.take_up(evaluator)
-            if count:
-                progress.tell(f"{count} evaluations of an earlier run are taken up")
-            evaluator.on_new = record.add
-            result = _searched(evaluator, design, file, progress)
+        problem = Problem(design, content, file)
+        with opened(directory, identity_of(content, problem), file) as record:
+
+            def prepare(evaluator: Evaluator, groups: str = "") -> None:
+                count = record.take_up(evaluator, groups)
+                if count:
+                    progress.tell(f"{count} evaluations of an earlier run are taken up")
+
+            result = _searched(problem, progress, prepare)
             write(result)
     return result
 
 
-def identity_of(content: Mapping[str, Any], evaluator: Evaluator) -> str:
+def identity_of(content: Mapping[str, Any], problem: Problem) -> str:
     """Hash of all that determines what a design finds."""
-    robot = evaluator.space.robot_file.full.model_dump(mode="json", exclude_none=True)
+    robot = problem.space.robot_file.full.model_dump(mode="json", exclude_none=True)
     plain = {key: value for key, value in content.items() if key not in ("robot", "files")}
     return digest({"method": METHOD, "version": __version__, "robot": robot, "design": plain})
 
 
-def _searched(evaluator: Evaluator, design: DesignFile, file: Path, progress: Progress) -> DesignSearch:
-    chosen = searched(evaluator, design.search, progress)
+def _searched(problem: Problem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
+    if problem.design.reconfigure is not None:
+        return _reconfigured(problem, progress, prepare)
+    evaluator = problem.evaluator()
+    prepare(evaluator)
+    chosen = searched(evaluator, problem.design.search, progress)
     names = ["best"] if len(chosen) == 1 else [f"front_{i + 1}" for i in range(len(chosen))]
     robots = tuple(designed(evaluator, one, name) for one, name in zip(chosen, names, strict=True))
-    return DesignSearch(file, evaluator, robots, not progress.stopped())
+    return DesignSearch(problem.file, problem.design, evaluator, robots, not progress.stopped())
+
+
+def _reconfigured(problem: Problem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
+    best, alone = reconfigured(problem, progress, prepare)
+    robots = (designed(best.evaluator, best.chosen, "best"),)
+    settings = _settings(best, [f"setting_{k + 1}" for k in range(len(best.space.groups))])
+    tasks = [one for division in alone for one in _settings(division, [f"alone_{division.space.groups[0][0]}"])]
+    return DesignSearch(
+        problem.file, problem.design, best.evaluator, robots, not progress.stopped(), tuple(settings), tuple(tasks)
+    )
+
+
+def _settings(division: Division, names: list[str]) -> list[Setting]:
+    space, evaluation = division.space, division.chosen.evaluation
+    settings = []
+    for k, (tasks, name) in enumerate(zip(space.groups, names, strict=True)):
+        point = space.of_group(evaluation.point, k)
+        robot_file = space.base.robot_at(point)
+        settings.append(
+            Setting(
+                name,
+                tasks,
+                robot_file.model_copy(update={"name": f"{robot_file.name}-{name.replace('_', '-')}"}),
+                dict(zip(space.base.names, point.values, strict=True)),
+                evaluation.values[0],
+            )
+        )
+    return settings
 
 
 def designed(evaluator: Evaluator, chosen: Chosen, name: str) -> DesignedRobot:
     """The robot of a point, with what holds it."""
     evaluation = chosen.evaluation
     careful = evaluator.with_requirements(chosen.requirements or evaluator.requirements)
-    robot_file = evaluator.space.robot_at(evaluation.point)
+    space = evaluator.space
+    point = space.of_group(evaluation.point, 0) if isinstance(space, GroupedSpace) else evaluation.point
+    robot_file = (space.base if isinstance(space, GroupedSpace) else space).robot_at(point)
     file_name = f"{robot_file.name}-{name.replace('_', '-')}"
     return DesignedRobot(
         name=name,

@@ -38,7 +38,7 @@ def screened(evaluator: Evaluator, count: int | None, stopped: Callable[[], bool
 
 def _evaluate(evaluator: Evaluator, points: Sequence[Point], stopped: Callable[[], bool]) -> None:
     for start in range(0, len(points), AT_ONCE):
-        if stopped():
+        if stopped() and evaluator.record:  # there is always a robot to end with
             return
         evaluator.many(points[start : start + AT_ONCE])
 

@@ -88,7 +88,9 @@ class RobotSpace:
 
     def point(self, fractions: Float[np.ndarray, "k"], arrangement: int) -> Point:
         """The point at fractions of the ranges of the parameters."""
-        values = self.lower + np.clip(fractions, 0.0, 1.0) * (self.upper - self.lower)
+        inside = np.clip(fractions, 0.0, 1.0)
+        inside = np.where(inside < AT_BOUND, 0.0, np.where(inside > 1.0 - AT_BOUND, 1.0, inside))
+        values = self.lower + inside * (self.upper - self.lower)
         return Point(tuple(np.clip(values, self.lower, self.upper).tolist()), arrangement)
 
     def fractions(self, point: Point) -> Float[np.ndarray, "k"]:

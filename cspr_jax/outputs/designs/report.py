@@ -11,7 +11,7 @@ from cspr_jax.schema.plan_fields import SEGMENT
 from cspr_jax.schema.quantities import ARRANGEMENT, QUANTITIES
 from cspr_jax.synthesis.measures.maps import MapMeasure
 from cspr_jax.synthesis.questions import Question
-from cspr_jax.synthesis.results import DesignedRobot, DesignSearch
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting
 
 SCHEMA = 1
 # Units of sizes of frames; digits in tables.
@@ -50,6 +50,8 @@ def design_object(search: DesignSearch) -> dict[str, Any]:
             "objectives": [_question_object(search, one) for one in evaluator.objectives],
             "requirements": [_question_object(search, one) for one in evaluator.requirements],
             "robots": [robot_object(search, one) for one in search.robots],
+            **({"settings": list(map(_setting_object, search.settings))} if search.settings else {}),
+            **({"alone": list(map(_setting_object, search.alone))} if search.alone else {}),
         }
     )
 
@@ -65,6 +67,15 @@ def _question_object(search: DesignSearch, question: Question) -> dict[str, Any]
     if question.sense:
         return fields | {"goal": "largest" if question.sense > 0 else "smallest"}
     return fields | {"lower": question.low, "upper": question.high, "prove": question.prove}
+
+
+def _setting_object(setting: Setting) -> dict[str, Any]:
+    return {
+        "name": setting.name,
+        "tasks": list(setting.tasks),
+        "parameters": setting.parameters,
+        "objective": setting.value,
+    }
 
 
 def robot_object(search: DesignSearch, robot: DesignedRobot) -> dict[str, Any]:
@@ -106,6 +117,14 @@ def design_lines(search: DesignSearch) -> list[str]:
         state = "proved in all" if proof.is_whole else f"proved in {proof.proved} of"
         lines.append(f"{proof.name}: {state} {proof.cells} full cells")
     lines += [f"{one.parameter} is held by {one.by}" for one in best.sensitivities.holdings]
+    if search.settings:
+        changes = len(search.settings) - 1
+        lines.append(f"fewest changes between tasks: {changes}")
+        lines += [f"{one.name}, for {' and '.join(one.tasks)}: {values_words(one)}" for one in search.settings]
+        lines += [
+            f"{one.tasks[0]} alone: {values_words(one)}, {search.questions[0].name} {number(one.value)}"
+            for one in search.alone
+        ]
     return lines
 
 
@@ -118,6 +137,11 @@ def question_words(search: DesignSearch, question: Question) -> str:
     bounds = [f">= {number(question.low)}"] if math.isfinite(question.low) else []
     bounds += [f"<= {number(question.high)}"] if math.isfinite(question.high) else []
     return f"required {question.name} {' and '.join(bounds)}"
+
+
+def values_words(setting: Setting) -> str:
+    """Values of the parameters of a setting, in words."""
+    return ", ".join(f"{name} {number(value)}" for name, value in setting.parameters.items())
 
 
 def number(value: float) -> str:

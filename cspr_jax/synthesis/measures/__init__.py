@@ -10,4 +10,5 @@ Files, each importing only from those above it:
     workspaces   those of maps of workspaces, of many robots at once, with exact derivatives
     plans        fields of the segments of a plan
     frames       sizes of the frame, numbers of the robot file, distances in a hall
+    groups       measures of robots that are set anew between tasks
 """

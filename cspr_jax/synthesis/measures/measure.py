@@ -56,6 +56,11 @@ class Measure(abc.ABC):
     def jumps(self, quantity: str) -> bool:
         """Tell whether a quantity has no derivative, such as a number of arcs."""
 
+    def sides(self, point: Point) -> Int[np.ndarray, "n"]:
+        """Which side each full cell is proved to be on: 1 inside, 2 outside, 0 open; none without cells."""
+        del point
+        return np.zeros(0, int)
+
     def words(self, point: Point, quantity: str, element: Int[np.ndarray, "2"]) -> str:
         """Words that follow the name of a quantity: which element it is, and what decides it."""
         del point, quantity, element

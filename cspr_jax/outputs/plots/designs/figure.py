@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from matplotlib.lines import Line2D
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.outputs.designs.report import unit_of
+from cspr_jax.outputs.plots.robots.obstacles import draw_bodies
 from cspr_jax.outputs.plots.robots.robot_at import hull_of
 from cspr_jax.outputs.plots.style.labels import COLOURS
 from cspr_jax.outputs.plots.style.scene import set_space
 from cspr_jax.synthesis.results import DesignSearch
 
 WIDTH, HEIGHT = 10.0, 4.6  # inches
+MAX_FRAMES = 4  # beside that of the robot file
 GREY, FAINT = "#9aa1a9", "#ccd1d6"
 # Part of the range of numbers of feasible robots that is shown beyond them.
 BEYOND = 0.15
@@ -28,11 +31,14 @@ def design_figure(search: DesignSearch) -> Figure:
     figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
     grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
     panel = figure.add_subplot(grid[0])
-    if len(search.evaluator.objectives) == 2:
+    if search.settings:
+        _over_tasks(panel, search)
+    elif len(search.evaluator.objectives) == 2:
         _front(panel, search)
     else:
         _against_parameter(panel, search)
-    _frames(figure.add_subplot(grid[1], projection="3d"), search)
+    handles = _frames(figure.add_subplot(grid[1], projection="3d"), search)
+    figure.legend(handles=handles, loc="outside lower right", ncols=len(handles), fontsize="small")
     objectives = " and ".join(
         f"{'largest' if one.sense > 0 else 'smallest'} {one.name}" for one in search.evaluator.objectives
     )
@@ -103,13 +109,52 @@ def _decisive(search: DesignSearch, values: Float[np.ndarray, "n"]) -> str | Non
     return names[int(np.nan_to_num(strengths).argmax())]
 
 
-def _frames(panel: Any, search: DesignSearch) -> None:
-    first, best = search.evaluator.space.robot_file.full, search.best.robot_file
-    shapes = [_draw(panel, first, GREY, 1.0), _draw(panel, best, COLOURS[1], 1.6)]
-    set_space(panel, np.concatenate(shapes), is_down=first.z_axis == "down")
-    names = ("robot file", search.best.name.replace("_", " "))
-    handles = [Line2D([], [], color=c, label=n) for c, n in zip((GREY, COLOURS[1]), names, strict=True)]
-    panel.legend(handles=handles, loc="upper right", fontsize="small")
+def _frames(panel: Any, search: DesignSearch) -> list[Line2D]:
+    first = search.evaluator.space.robot_file.full
+    robots = [(setting.name, setting.robot_file) for setting in search.settings]
+    robots = robots or [(robot.name, robot.robot_file) for robot in (search.robots[0], search.robots[-1])]
+    drawn = {"robot file": first} | dict(robots[:MAX_FRAMES])
+    colours = [GREY, *(COLOURS[(k + 1) % len(COLOURS)] for k in range(len(drawn) - 1))]
+    widths = [1.0, *(1.6 for _ in colours[1:])]
+    shapes = [_draw(panel, *one) for one in zip(drawn.values(), colours, widths, strict=True)]
+    is_down = first.z_axis == "down"
+    set_space(panel, np.concatenate([*shapes, *_hall(panel, search, is_down=is_down)]), is_down=is_down)
+    handles = [Line2D([], [], color=c, label=n.replace("_", " ")) for c, n in zip(colours, drawn, strict=True)]
+    return handles
+
+
+def _hall(panel: Any, search: DesignSearch, *, is_down: bool) -> list[np.ndarray]:
+    # The walls of the hall and the bodies in it, drawn; corners of the walls.
+    hall = search.design.hall
+    if hall is None:
+        return []
+    draw_bodies(panel, [table.shape() for table in hall.obstacle or ()], is_down=is_down)
+    if hall.corners is None:
+        return []
+    low, high = np.asarray(hall.corners, float)
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    for a, b in itertools.combinations(corners, 2):
+        if (a != b).sum() == 1:
+            panel.plot(*np.stack([a, b]).T, color=FAINT, linewidth=0.8)
+    return [corners]
+
+
+def _over_tasks(panel: Axes, search: DesignSearch) -> None:
+    # Values of the parameters that are set anew, over the tasks: with the fewest changes, and for each task alone.
+    tasks = [task for setting in search.settings for task in setting.tasks]
+    names = search.design.reconfigure.parameters if search.design.reconfigure else []
+    for k, name in enumerate(names):
+        values = [setting.parameters[name] for setting in search.settings for _ in setting.tasks]
+        panel.step(range(len(tasks)), values, where="mid", color=COLOURS[k % len(COLOURS)], linewidth=1.6, label=name)
+        alone = {setting.tasks[0]: setting.parameters[name] for setting in search.alone}
+        panel.plot(range(len(tasks)), [alone[task] for task in tasks], "o", color=COLOURS[k % len(COLOURS)], mfc="none")
+    panel.plot([], [], "o", color="black", mfc="none", label="each task alone")
+    units = {one.unit for one in search.evaluator.space.variables} - {"1"}
+    panel.set(xlabel="task", ylabel="value" + (f" ({units.pop()})" if len(units) == 1 else ""))
+    panel.set_xticks(range(len(tasks)), tasks)
+    panel.margins(0.12)
+    panel.grid(alpha=0.25)
+    panel.legend(loc="best", fontsize="small")
 
 
 def _draw(panel: Any, robot_file: RobotFile, colour: str, width: float) -> np.ndarray:
