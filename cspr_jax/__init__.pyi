@@ -3,6 +3,12 @@
 from cspr_jax.api.calibration import calibrate as calibrate
 from cspr_jax.api.checks import check as check
 from cspr_jax.api.designs import design as design
+from cspr_jax.api.differentiable import ellipse_margin as ellipse_margin
+from cspr_jax.api.differentiable import pose_frequencies as pose_frequencies
+from cspr_jax.api.differentiable import pose_lengths as pose_lengths
+from cspr_jax.api.differentiable import pose_margin as pose_margin
+from cspr_jax.api.differentiable import pose_tensions as pose_tensions
+from cspr_jax.api.differentiable import pose_wrench_matrix as pose_wrench_matrix
 from cspr_jax.api.elasticity import natural_frequencies as natural_frequencies
 from cspr_jax.api.elasticity import stiffness as stiffness
 from cspr_jax.api.families.beziers import bezier as bezier

@@ -8,11 +8,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
-from cspr_jax.api.arguments.kernel_arguments import check_in_plane, points_of
+from cspr_jax.api.arguments.kernel_arguments import check_in_plane, check_rule, points_of
 from cspr_jax.api.workspaces import check_kind, kernel_poses
 from cspr_jax.errors import InputError
 from cspr_jax.errors.arguments import Points, Quaternions, TensionsOfPoses
-from cspr_jax.errors.suggestions import one_of
 from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.robots.cables import AnyRobot
@@ -22,9 +21,8 @@ from cspr_jax.robots.elasticity.stiffness import Stiffness
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
-from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
-from cspr_jax.robots.statics.kernel_axes import centred
-from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.robots.statics.kernel_axes import centred, coordinate_signs
 
 STATES = "tensions of a state of motion"
 
@@ -105,7 +103,7 @@ def stiffness(
     """
     with double_precision():
         matrices = _matrices(robot, positions, quaternions, tensions, rule, point)
-        signs = _signs(matrices.robot, matrices.frame)
+        signs = coordinate_signs(matrices.robot, matrices.frame)
         both = signs[:, None] * signs
         parts = {name: getattr(matrices.stiffness, name) * both[None] for name in ("elastic", "geometric", "mass")}
         slack = ~are_taut(matrices.tensions)
@@ -169,11 +167,7 @@ def _matrices(robot, positions, quaternions, tensions, rule: str, point: str | N
         raise InputError(
             "axial_stiffness", None, "must be given, in N: with_cables(robot, axial_stiffness=...)", problem="missing"
         )
-    if rule not in TENSION_RULES:
-        raise InputError("rule", rule, one_of(rule, TENSION_RULES))
-    highest = np.asarray(tension_range(robot, robot.limits)[1])
-    if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and not np.isfinite(highest).all():
-        raise InputError("rule", rule, "another one without a largest tension of every cable")
+    check_rule(robot, rule)
     points = points_of("positions", positions)
     check_in_plane("positions", points, is_planar=PATTERNS[robot.pattern].is_planar)
     inner, frame = centred(robot)
@@ -189,10 +183,3 @@ def _checked_tensions(tensions, shape: tuple[int, ...]) -> np.ndarray:
     if values.shape not in ((), shape[1:], shape):
         raise InputError("tensions", f"shape {values.shape}", f"numbers > 0 of shape (), {shape[1:]} or {shape}, N")
     return np.broadcast_to(values, shape).copy()
-
-
-def _signs(robot: AnyRobot, frame: Frame) -> np.ndarray:
-    # Signs of the coordinates in the axes of the robot file; those of a rod's rotations are about axes of its own.
-    row = PATTERNS[robot.pattern]
-    turning = np.ones(2) if row.along_line else frame.signs[list(row.moments)]
-    return np.concatenate([frame.signs[list(row.forces)], turning])

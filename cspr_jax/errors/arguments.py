@@ -187,6 +187,7 @@ ManyTimes = Annotated[ArrayLike, times("(n,) or (k, n), s", (ANY,), (ANY, ANY))]
 Frequencies = Annotated[ArrayLike, Numbers("numbers > 0, rad/s", ((), (ANY,)), positive=True)]
 _FREQUENCIES = ("natural", "best", "fastest", "slowest")
 _FREQUENCY = 'a number > 0, rad/s, or "natural", "best", "fastest" or "slowest"'
+Rate = Annotated[ArrayLike, Numbers("a number > 0, rad/s", positive=True, traced=True)]
 Frequency = Annotated[ArrayLike, Choice(Numbers(_FREQUENCY, positive=True, traced=True), _FREQUENCIES)]
 
 # Bounds of lengths, as in robot files.
@@ -225,6 +226,10 @@ Depths = Annotated[ArrayLike, DEPTHS]
 Depth = Annotated[ArrayLike, Numbers(_DEPTH, positive=True, maximum=LARGEST_LENGTH, traced=True)]
 
 Quaternions = Annotated[ArrayLike, Numbers("None, or unit quaternions of shape (n, 4), scalar first", ((ANY, 4),))]
+QuaternionOrNone = Annotated[
+    ArrayLike | None,
+    Choice(Numbers("None, or a quaternion of shape (4,), scalar first", ((4,),), traced=True), (None,)),
+]
 QuaternionsOfMany = Annotated[ArrayLike, Numbers("None, or quaternions of shape (k, n, 4)", ((ANY, ANY, 4),))]
 QuaternionsAtEnds = Annotated[Any, Numbers("two unit quaternions, scalar first", ((2, 4),), traced=True)]
 BetaHats = Annotated[Any, Numbers("two finite numbers", ((2,),), traced=True)]

@@ -27,6 +27,7 @@ from cspr_jax.robots.model.winches import tensions_within, winch_limits, winches
 from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.robots.tensions.tension_distribution import Distribution
+from cspr_jax.robots.tensions.tension_distribution import centred as most_central
 from cspr_jax.robots.tensions.tension_rules import by_rule
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
@@ -93,9 +94,8 @@ def tensions(
     if robot.n_cables > robot.dof:
         return shared(robot, state, limits, rule).tensions
     if robot.pulleys is not None or robot.pattern not in MOVED:
-        unit = wrench_units(robot)
-        wrench = (robot.inertial_wrench(state) / unit)[:, None]
-        return solved(robot.wrench_matrix(state) / unit[:, None], wrench)[0][:, 0]
+        matrix, wrench = _balance(robot, state)
+        return solved(matrix, wrench[:, None])[0][:, 0]
     if isinstance(robot, PlatformRobot):
         return wrench_balance.tensions(robot, state)
     return force_balance.tensions(robot, state.position, state.acceleration)
@@ -103,11 +103,25 @@ def tensions(
 
 def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribution:
     """Tensions of redundant cables, with their residual; within limits of their motors, if there are such."""
+    return by_rule(rule, *_balance(robot, state), *_range(robot, state, limits))
+
+
+def margin(robot: AnyRobot, state: State, limits: Limits) -> Float[Array, ""]:
+    """Largest distance that tensions can keep from their limits, N; -inf where the cables do not span all wrenches."""
+    return most_central(*_balance(robot, state), *_range(robot, state, limits))[1]
+
+
+def _balance(robot: AnyRobot, state: State) -> tuple[Array, Array]:
+    unit = wrench_units(robot)
+    return robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit
+
+
+def _range(robot: AnyRobot, state: State, limits: Limits) -> tuple[Array, Array]:
+    # Smallest and largest tensions, also those that motors allow.
     low, high = tension_range(robot, limits)
     if robot.winches is not None and BOUNDING & {name for name, value in vars(limits).items() if value is not None}:
-        low, high = tensions_within(robot.winches, limits, cable_motion(robot, state), (low, high))
-    unit = wrench_units(robot)
-    return by_rule(rule, robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit, low, high)
+        return tensions_within(robot.winches, limits, cable_motion(robot, state), (low, high))
+    return low, high
 
 
 def wrench_units(robot: AnyRobot) -> Float[Array, "dof"]:

@@ -24,6 +24,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.model.robot import check_determined, check_moved
+from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.kernel_axes import prepared
 
 
@@ -37,6 +38,20 @@ def check_in_plane(key: str, points: Float[np.ndarray, "n 3"], *, is_planar: boo
     """Refuse points outside the plane of a planar robot."""
     if is_planar and points[:, 1].any():
         raise InputError(key, "y not 0", "y = 0: the plane of a planar robot")
+
+
+def check_rule(robot: Any, rule: str) -> None:
+    """Refuse an unknown rule of tensions, and one that needs a largest tension of every cable where there is none."""
+    if rule not in TENSION_RULES:
+        raise InputError("rule", rule, one_of(rule, TENSION_RULES))
+    high = robot.limits.tension_max
+    if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
+        raise InputError("rule", rule, "another one without a largest tension of every cable")
+
+
+def _is_finite(values: Any) -> bool:
+    # Numbers that jax traces count as finite, since they have no values yet.
+    return isinstance(values, jax.core.Tracer) or bool(np.isfinite(np.asarray(values)).all())
 
 
 def starts_and_ends(robot: Any, start, targets) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:

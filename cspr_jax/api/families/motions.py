@@ -15,7 +15,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.api.arguments.checks import checked
-from cspr_jax.api.arguments.kernel_arguments import amplitude_of, kernel_problem, warn_of_rest
+from cspr_jax.api.arguments.kernel_arguments import amplitude_of, check_rule, kernel_problem, warn_of_rest
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.interpolation import linear_maps
 from cspr_jax.curves.spline import Spline
@@ -33,7 +33,6 @@ from cspr_jax.errors.arguments import (
     Times,
     Turns,
 )
-from cspr_jax.errors.suggestions import one_of
 from cspr_jax.families.platforms.end_acceleration import AT_REST
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, pose_segment
 from cspr_jax.families.swings.hypocycloid import Hypocycloid, segment
@@ -51,7 +50,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.model.state import State
-from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
+from cspr_jax.robots.model.tension_rule_table import CENTRED
 from cspr_jax.robots.statics.kernel_axes import centred, prepared
 
 amplitude = checked(name="amplitude", module=__name__)(named)
@@ -257,17 +256,8 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
         InputError: an unknown rule, or a rule that needs a largest tension of every cable on a robot without them.
     """
     prepared_robot, frame = prepared(robot, pulleys=True)
-    if rule not in TENSION_RULES:
-        raise InputError("rule", rule, one_of(rule, TENSION_RULES))
-    high = robot.limits.tension_max
-    if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
-        raise InputError("rule", rule, "another one without a largest tension of every cable")
+    check_rule(robot, rule)
     return cables.tensions(prepared_robot, inward(frame, state), robot.limits, rule)
-
-
-def _is_finite(numbers: Array) -> bool:
-    # Numbers that jax traces count as finite, since they have no values yet.
-    return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 
 @checked(traced=True)

@@ -65,8 +65,18 @@ class _Terms(NamedTuple):
     swing: Array
 
 
+@jax.custom_jvp
 def _norm(pair: tuple[Array, Array]) -> Array:
     return jnp.sqrt(pair[0] * pair[0] + pair[1] * pair[1])
+
+
+@_norm.defjvp
+def _norm_derivative(primals, tangents):
+    # Level ellipses have no harmonic of the depth, whose norm is then at its minimum: the derivative is 0.
+    (pair,), (change,) = primals, tangents
+    norm = _norm(pair)
+    product = pair[0] * change[0] + pair[1] * change[1]
+    return norm, jnp.where(norm > 0.0, product / jnp.where(norm > 0.0, norm, 1.0), 0.0)
 
 
 def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
@@ -111,7 +121,7 @@ def _margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> list[Array]
 
 def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Float[Array, ""]) -> Float[Array, ""]:
     """The smallest margin along an ellipse."""
-    return reduce(jnp.minimum, _margins(hull, ellipse, frequency))
+    return reduce(lambda a, b: jnp.where((b < a) | jnp.isnan(b), b, a), _margins(hull, ellipse, frequency))
 
 
 def _roots(terms: _Terms) -> tuple[Array, Array]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from scipy.spatial import ConvexHull
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import as_float64
+from cspr_jax.numerics.elementary import as_float64, maximum_of
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
@@ -44,6 +45,23 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
         raise InputError("base_points", None, allowed, problem="spools in several planes")
     edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
     return SpoolHull(as_float64(edges), as_float64(normal), as_float64(robot.gravity))
+
+
+def traced_hull(robot: PointMassRobot) -> SpoolHull:
+    """Hull of the spools of a robot that jax may trace, which lie in one plane; some edges several times."""
+    points, normal = robot.base_points, plane_normal(robot)
+    if robot.dof < SPATIAL:
+        ends = jnp.stack([points[jnp.argmin(points[:, 0]), 0], points[jnp.argmax(points[:, 0]), 0]])
+        return SpoolHull(jnp.stack([-1.0 / ends, jnp.zeros_like(ends)], axis=1), normal, robot.gravity)
+    first, second = np.triu_indices(len(points), 1)
+    (ax, ay), (bx, by) = points[first, :2].T, points[second, :2].T
+    area = ax * by - ay * bx
+    is_line = jnp.abs(area) > IN_PLANE * maximum_of(jnp.abs(area))
+    gradients = jnp.stack([ay - by, bx - ax], axis=1) / jnp.where(is_line, area, 1.0)[:, None]
+    # The line through two spools is an edge if all spools lie on the side of their centroid.
+    is_edge = is_line & (gradients @ points[:, :2].T >= -1.0 - IN_PLANE).all(1)
+    edges = jnp.where(is_edge[:, None], gradients, gradients[jnp.argmax(is_edge)][None])
+    return SpoolHull(edges, normal, robot.gravity)
 
 
 def formula_hull(robot: AnyRobot) -> SpoolHull | None:

@@ -15,6 +15,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import maximum_of
+from cspr_jax.numerics.linear.eigenvalues import eigenpairs, inverse_factor
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots import cables
@@ -110,14 +112,32 @@ def modes_in(robot: AnyRobot, states: State, tensions: Float[np.ndarray, "n n_ca
 def _at_rest(robot: AnyRobot, limits: Limits, poses: tuple[Array, Array], *, rule: str) -> tuple[State, Array]:
     def one(centre: Array, quaternion: Array) -> tuple[State, Array]:
         state = at_rest(centre, matrix(quaternion))
-        tensions, wrench = cables.tensions(robot, state, limits, rule), robot.inertial_wrench(state)
-        missed = jnp.linalg.norm(robot.wrench_matrix(state) @ tensions - wrench)
-        balanced = missed <= BALANCED * (1.0 + jnp.linalg.norm(wrench))
+        tensions = tensions_at_rest(robot, state, limits, rule)
         if not PATTERNS[robot.pattern].is_body:
             state = State(*state[:3])
-        return state, jnp.where(balanced, tensions, jnp.nan)
+        return state, tensions
 
     return jax.vmap(one)(*poses)
+
+
+def tensions_at_rest(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Float[Array, "n_cables"]:
+    """Tensions that hold a robot at rest; NaN where none do."""
+    tensions, wrench = cables.tensions(robot, state, limits, rule), robot.inertial_wrench(state)
+    missed = jnp.linalg.norm(robot.wrench_matrix(state) @ tensions - wrench)
+    return jnp.where(missed <= BALANCED * (1.0 + jnp.linalg.norm(wrench)), tensions, jnp.nan)
+
+
+def frequencies_at_rest(robot: AnyRobot, state: State, limits: Limits, rule: str = CENTRED) -> Float[Array, "dof"]:
+    """Natural frequencies in one state at rest, as in `modes_of`, in pure jax."""
+    tensions = tensions_at_rest(robot, state, limits, rule)
+    is_taut = (tensions > SLACK * maximum_of(jnp.abs(tensions))).all()
+    # Gradients of numbers that are not selected must be finite, too.
+    stiffness = stiffness_at(robot, state, jnp.where(is_taut, tensions, 1.0))
+    back = inverse_factor(stiffness.mass)
+    squares = eigenpairs(back @ stiffness.total @ back.T)[0]
+    is_stable = squares > 0.0
+    frequencies = jnp.where(is_stable, jnp.sqrt(jnp.where(is_stable, squares, 1.0)), 0.0)
+    return jnp.where(is_taut, frequencies, jnp.nan)
 
 
 @partial(jax.jit, static_argnames=("rule",))

@@ -1,15 +1,21 @@
 """Robots in the axes of the kernels: origin at the centroid of the spools, z down."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Any, TypeVar
 
+import numpy as np
+
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame, frame_of
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.pulleys import Pulleys
-from cspr_jax.robots.model.robot import check_moved
+from cspr_jax.robots.model.robot import Robot, check_moved
 from cspr_jax.robots.statics.reference_pose import aligned
 
 RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
@@ -34,3 +40,10 @@ def prepared(robot: RobotKind, *, pulleys: bool = False) -> tuple[RobotKind, Fra
     check_moved(robot, pulleys=pulleys)
     moved, frame = centred(robot)
     return (aligned(moved)[0] if isinstance(moved, PlatformRobot) else moved), frame  # type: ignore[return-value]
+
+
+def coordinate_signs(robot: Robot, frame: Frame) -> Float[np.ndarray, "dof"]:
+    """Signs of forces and moments in the axes of the robot file; a rod's moments are about axes of its own."""
+    row = PATTERNS[robot.pattern]
+    turning = np.ones(2) if row.along_line else frame.signs[list(row.moments)]
+    return np.concatenate([frame.signs[list(row.forces)], turning])

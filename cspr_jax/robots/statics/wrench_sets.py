@@ -16,7 +16,7 @@ import math
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 
 from cspr_jax.numerics.elementary import as_float64, maximum_of, minimum_of
 from cspr_jax.numerics.shapes import Float
@@ -108,6 +108,8 @@ def spanning(count: int, dof: int) -> np.ndarray:
 def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices dof"]:
     """Normals to all choices of d - 1 columns: their generalised cross products."""
     dof, count = matrix.shape
+    if dof == 1:
+        return jnp.ones((1, 1), matrix.dtype)
     products = matrix.T  # minors of one column, indexed by row
     for n in range(2, dof):
         parent, last, row, rest, sign = _level(dof, count, n)
@@ -135,9 +137,11 @@ def one_sided_faces(
     chosen = beside_faces(count, dof)
     if count - dof > 2:
         normals = normals_to(matrix)
-        norm = jnp.linalg.norm(normals, axis=1)[:, None]
-        along = jnp.take_along_axis(normals / jnp.where(norm > FLAT, norm, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
-        return jnp.where((norm > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
+        square = jnp.sum(normals**2, axis=1)[:, None]
+        is_normal = square > FLAT**2
+        units = normals / jnp.sqrt(jnp.where(is_normal, square, 1.0))
+        along = jnp.take_along_axis(units @ matrix, jnp.asarray(chosen), axis=1)
+        return jnp.where(is_normal, _without_noise(along), 0.0)
     # The products are the coefficients of the linear relation among the kernel's rows for the other cables.
     rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
@@ -148,8 +152,13 @@ def one_sided_faces(
         after, last = rows[:, np.array([1, 2, 0])], rows[:, np.array([2, 0, 1])]
         along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
     norm = maximum_of(jnp.abs(along), axis=1, keepdims=True)
-    along = jnp.where(norm > FLAT, along / jnp.where(norm > FLAT, norm, 1.0), 0.0)
-    return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
+    return _without_noise(jnp.where(norm > FLAT, along / jnp.where(norm > FLAT, norm, 1.0), 0.0))
+
+
+def _without_noise(along: Array) -> Array:
+    # Products that are zero but for rounding become zero, and keep their derivatives.
+    is_noise = jnp.abs(along) <= FLAT
+    return jnp.where(is_noise, along - lax.stop_gradient(along), jnp.where(jnp.isnan(along), 0.0, along))
 
 
 def face_distances(

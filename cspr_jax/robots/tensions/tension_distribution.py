@@ -31,6 +31,7 @@ WITHIN = TOUCHED  # largest violation of a limit that counts as kept, over the l
 TENSION_ERROR = 1e-11  # the same for comparing candidates
 # A unit vector depends linearly on others if its component normal to them is shorter than this.
 DEPENDENT = 1e-10
+INDEPENDENT = 1e-7  # the same, for limits from which derivatives follow
 # Largest number of steps of the search for active limits, over the number of cables; random cases take fewer than two.
 LONGEST = 10
 
@@ -90,11 +91,59 @@ def centred(
 ) -> tuple[Distribution, Array]:
     """The tensions that are farthest from their limits; among these, those of least norm."""
     solutions = all_tensions(matrix, wrench)
-    largest = _largest_distance(matrix, tension_min, tension_max, solutions)
-    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
-    tensions = solutions.tensions(_shortest(solutions, tension_min + inwards, tension_max - inwards))
+    tensions, largest = _most_central(matrix, tension_min, tension_max, solutions.min_norm, solutions.kernel)
     answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
     return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
+
+
+@jax.custom_jvp
+def _most_central(matrix: Array, low: Array, high: Array, min_norm: Array, kernel: Array) -> tuple[Array, Array]:
+    # The central tensions, and their largest distance from the limits.
+    solutions = AllTensions(min_norm, kernel, jnp.asarray(True))
+    largest, _ = _largest_distance(matrix, low, high, solutions)
+    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
+    return solutions.tensions(_shortest(solutions, low + inwards, high - inwards)), largest
+
+
+@_most_central.defjvp
+def _most_central_derivatives(primals, tangents):
+    # Cables of the nearest face are at their limits even where symmetry alone would bring them there: the search for
+    # the shortest tensions may then name too few limits, from which the same tensions follow, but other derivatives.
+    values = _most_central(*primals)
+
+    def followed(matrix, low, high, min_norm, kernel):
+        solutions = AllTensions(min_norm, kernel, jnp.asarray(True))
+        largest, nearest = _largest_distance(matrix, low, high, solutions)
+        inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
+        low, high = low + inwards, high - inwards
+        sides = _independent(kernel, nearest, _sides_at(values[0], low, high))
+        return solutions.tensions(_at_limits(solutions, low, high, sides)), largest
+
+    return values, jax.jvp(followed, primals, tangents)[1]
+
+
+def _sides_at(tensions: Array, low: Array, high: Array) -> Array:
+    # Limits that tensions are at, with the signs of `_limits_reached`.
+    near = WITHIN * maximum_of(jnp.abs(tensions))
+    return jnp.where(jnp.abs(tensions - low) <= near, 1.0, jnp.where(jnp.abs(tensions - high) <= near, -1.0, 0.0))
+
+
+def _independent(kernel: Array, first: Array, others: Array) -> Array:
+    """Sides of cables with independent columns of the kernel: as many as there are, those of the face first."""
+    kernel, first, others = lax.stop_gradient((kernel, first, others))
+    freedom, count = kernel.shape
+    order = jnp.argsort(jnp.where(first != 0.0, 0, jnp.where(others != 0.0, 1, 2)))
+
+    def hold(carry, k):
+        rest, sides = carry
+        side = jnp.where(first[k] != 0.0, first[k], others[k])
+        square = jnp.sum(rest[:, k] ** 2)
+        is_held = (side != 0.0) & (square > INDEPENDENT**2)
+        unit = rest[:, k] / jnp.sqrt(jnp.where(is_held, square, 1.0))
+        rest = jnp.where(is_held, rest - unit[:, None] * (unit @ rest)[None], rest)
+        return (rest, jnp.where(is_held & (jnp.arange(count) == k), side, sides)), None
+
+    return lax.scan(hold, (kernel, jnp.zeros(count)), order)[0][1] if freedom else jnp.zeros(count)
 
 
 def checked(
@@ -290,11 +339,14 @@ def projected(
     return solution[:freedom], solution[freedom:]
 
 
-def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
-    """Largest distance r from limits, () N: the minimum of half of each cable's range and of what each face allows."""
+def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> tuple[Array, Array]:
+    """Largest distance r from limits, () N: the minimum of half of each cable's range and of what each face allows.
+
+    Also the sides (n,) of the cables that are at this distance from limits there, as in `_limits_reached`.
+    """
     dof, count = matrix.shape
     if count == dof:
-        return minimum_of(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))
+        return _smallest(jnp.concatenate([solutions.min_norm - low, high - solutions.min_norm])), jnp.zeros(count)
     others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
 
     def slack(along, cables):
@@ -308,6 +360,14 @@ def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTens
     nearest = jnp.argmin(each)
     is_face = jnp.isfinite(each[nearest])
     along = jnp.where(is_face, both[nearest], 0.0)
-    norm = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
+    norm = jnp.where(is_face, jnp.sum(jnp.where(along < 0.0, -along, along)), 1.0)
     distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / norm, jnp.inf)
-    return jnp.minimum(distance, 0.5 * minimum_of(high - low))
+    half, narrowest = 0.5 * _smallest(high - low), jnp.arange(count) == jnp.argmin(high - low)
+    is_half = (half < distance) | jnp.isnan(half)
+    sides = jnp.zeros(count).at[jnp.asarray(cables)[nearest]].set(jnp.sign(along))
+    return jnp.where(is_half, half, distance), jnp.where(is_half, jnp.where(narrowest, 1.0, 0.0), sides)
+
+
+def _smallest(values: Array) -> Array:
+    # The smallest value, with the derivatives of the first of equal ones; XLA's minimum has their mean.
+    return values[jnp.argmin(values)]

@@ -62,7 +62,7 @@ def worst_facets(
     free = np.array(unbounded)
 
     def one(matrix):
-        normals = jnp.ones((1, 1)) if dof == 1 else normals_to(matrix)
+        normals = normals_to(matrix)
         along = jnp.where(is_own, 0.0, normals @ matrix)
         normals, along = jnp.concatenate([normals, -normals]), jnp.concatenate([along, -along])
         largest = maximum_of(jnp.abs(along), axis=1, keepdims=True)
