@@ -227,12 +227,12 @@ def _at(robot: AnyRobot, position: Array, quaternion: Array, point: str | None) 
     inner, frame = centred(robot)
     turn = jnp.asarray(frame.rotated_quaternions(quaternion))
     rotation = matrix(turn / jnp.sqrt(jnp.dot(turn, turn)))
-    place, row = jnp.asarray(frame.inward(position)), PATTERNS[robot.pattern]
+    centre, row = jnp.asarray(frame.inward(position)), PATTERNS[robot.pattern]
     if not isinstance(inner, PlatformRobot):
-        return inner, State(place, jnp.zeros_like(place), jnp.zeros_like(place)), frame
+        return inner, State(centre, jnp.zeros_like(centre), jnp.zeros_like(centre)), frame
     if point != "mass-centre" and not row.is_jointed and inner.centre_of_mass is not None:
-        place = place + rotation @ inner.centre_of_mass
-    return inner, at_rest(place, rotation), frame
+        centre = centre + rotation @ inner.centre_of_mass
+    return inner, at_rest(centre, rotation), frame
 
 
 def _lengths(robot: AnyRobot, position: Array, quaternion: Array, *, point: str | None) -> Array:

@@ -145,7 +145,7 @@ def test_folders_are_short():
 
 def test_tests_lie_in_folders_like_those_of_the_package():
     """Beside what they share, and what belongs to no folder."""
-    shared = {"house", "oracles", "properties", "reliability", "support"}
+    shared = {"derivatives", "house", "oracles", "properties", "reliability", "support"}
     folders = {path.parent.relative_to(ROOT / "tests").parts[0] for path in (ROOT / "tests").glob("*/*.py")}
     assert folders - shared <= {name.rpartition(".")[2] for name in PACKAGES}
     assert not list((ROOT / "tests").glob("test_*.py"))

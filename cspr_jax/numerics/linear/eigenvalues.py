@@ -47,7 +47,7 @@ def eigenpairs(matrix: Float[Array, "n n"]) -> tuple[Float[Array, "n"], Float[Ar
 
 @eigenpairs.defjvp
 def _derivatives(primals, tangents):
-    # Of equal eigenvalues the eigenvectors have no derivatives, which then are left out.
+    # Eigenvectors of equal eigenvalues have no derivatives, which then are left out.
     values, vectors = eigenpairs(*primals)
     change = vectors.T @ (0.5 * (tangents[0] + tangents[0].T)) @ vectors
     differences = values[None] - values[:, None]
