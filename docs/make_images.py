@@ -25,7 +25,8 @@ class Image(NamedTuple):
         seconds: that its commands took, on 2 cores that had other work too.
         plot: arguments of `cspr plot` after the results.
         sources: sweeps or plans in `sweeps`, one result each; empty: the one of the picture's name.
-        command: "run" for sweeps, "plan" for plans, "draw" for a script of its own, or a command that draws a file.
+        command: "run" for sweeps, "plan" for plans, "draw" for a script of its own, "design", or a command that draws
+            a file.
         suffix: of the file.
     """
 
@@ -44,6 +45,22 @@ IMAGES = {
         "Share of 1,000 poses that CoGiRo holds with 500 kg in each of the 40,320 arrangements of its cables.",
         60,
         command="draw",
+    ),
+    "design_motors": Image(
+        "Largest power of a motor over the height of three winches, and the winches in their hall.",
+        60,
+        command="design",
+    ),
+    "design_triangle": Image(
+        "Arcs and total time of Table 2.1's targets for 600 triangles and depths z0, and the best ones.",
+        400,
+        command="design",
+    ),
+    "design_orientations": Image(
+        "Attained orientations over the size of the triangle of six spools, and the best spools.", 120, command="design"
+    ),
+    "design_rails": Image(
+        "Positions of two spools on a rail for three shelves, with one change.", 20, command="design"
     ),
     "poses": Image(
         "Smallest number of arcs from rest to poses of a rigid platform, tilted by 46° in four directions.",
@@ -224,6 +241,9 @@ def commands_of(name: str, folder: str = "") -> list[str]:
     sources = image.sources or (name,)
     if image.command == "draw":
         return [f"python docs/draw_{name}.py"]
+    if image.command == "design":
+        directory = f"-o {RESULTS}/{name} --picture {folder}{name}.png"
+        return [f"cspr design sweeps/{name}.toml --dpi 90 {directory}"]
     if image.command in FILE_COMMANDS:
         return [" ".join(["cspr", image.command, *sources, *image.plot.split(), f"--dpi 90 -o {folder}{name}.png"])]
     if image.command == "plan":

@@ -90,19 +90,20 @@ def numbers_of(option: str, text: str, counts: tuple[int, ...] = (), *, is_posit
     return values
 
 
-def check_picture_format(path: Path) -> None:
+def check_picture_format(path: Path, option: str = "-o") -> None:
     """Refuse a name of a picture whose ending is no format of pictures."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     if path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
-        raise ConfigError("-o", f"{path}: must end in .png, .pdf, .svg or another picture format")
+        raise ConfigError(option, f"{path}: must end in .png, .pdf, .svg or another picture format")
 
 
-def checked_picture(options: argparse.Namespace) -> dict[str, Any]:
-    """Options of style of a picture that -o names, refused before slow work where they or the file are wrong."""
-    if options.output is not None:
-        check_picture_format(options.output)
-    check_writable(options.output)
+def checked_picture(options: argparse.Namespace, name: str = "output") -> dict[str, Any]:
+    """Options of style of a picture, -o or another one, refused before slow work where they or the file are wrong."""
+    path = getattr(options, name)
+    if path is not None:
+        check_picture_format(path, "-o" if name == "output" else f"--{name}")
+    check_writable(path)
     from cspr_jax.outputs.plots.style.style import style_of  # loads matplotlib
 
     style = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}

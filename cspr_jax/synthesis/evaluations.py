@@ -151,6 +151,12 @@ class Goal:
     level: float = -math.inf
     other: int = 1
 
+    def relaxed(self, fraction: float) -> Goal:
+        """The goal with a level that is lower by a fraction, where robots are to keep more in reserve."""
+        return (
+            self if math.isinf(self.level) else dataclasses.replace(self, level=self.level - fraction * abs(self.level))
+        )
+
     def rank(self, evaluator: Evaluator, evaluation: Evaluation) -> tuple[float, float, float]:
         """Sort key of a robot: the smaller, the better."""
         worth, missed = evaluator.worth(evaluation, self.objective), evaluation.missed

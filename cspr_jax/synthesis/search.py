@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from cspr_jax.config.design import SearchKeys
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.synthesis.counting import counted
 from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal, front_of
 from cspr_jax.synthesis.evolution import evolved
@@ -24,6 +26,8 @@ RESERVES = (1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
 HALVINGS = 3
 # Local searches end where so many have found the same number, up to this fraction of it.
 AGREEING, AGREED = 2, 1e-6
+# Robots of a front that are nearer to each other than this fraction of its extent count as one.
+NEAR = 1e-4
 
 
 @dataclasses.dataclass
@@ -102,41 +106,57 @@ def _agree(evaluator: Evaluator, results: list[Evaluation], goal: Goal) -> bool:
 
 
 def _front(evaluator: Evaluator, settings: SearchKeys, first: Evaluation, progress: Progress) -> list[Chosen]:
-    # The best robots by each objective, and between them the best by one while the other stays above levels; of all
-    # robots that were evaluated on the way those that no other surpasses in both.
+    # The best robots by each objective, and between them the best by one while the other stays above levels.
     last = _best(evaluator, settings, Goal(1, other=0), progress)
     # Levels of a number that jumps cost a search nothing, while it is hard to make large.
     main = int(not evaluator.objectives[0].is_smooth and evaluator.objectives[1].is_smooth)
-    ends = sorted(evaluator.worth(one, 1 - main) for one in (first, last))
+    ends, results = sorted(evaluator.worth(one, 1 - main) for one in (first, last)), [first, last]
     if first.missed == 0.0 and last.missed == 0.0 and all(map(math.isfinite, ends)):
-        few = settings.model_copy(update={"starts": 1})  # between robots that are known to be good
-        for level in np.linspace(ends[0], ends[1], settings.front)[1:-1]:
+        few = settings.model_copy(update={"starts": 1})  # beside robots that are known to be good
+        # At the ends the other objective is not yet as good as it can be.
+        goals = [Goal(1 - main, max(evaluator.worth(one, main) for one in (first, last)), main)]
+        goals += [Goal(main, float(level), 1 - main) for level in np.linspace(ends[0], ends[1], settings.front)[1:]]
+        for goal in goals:
             if progress.stopped():
                 break
-            _best(evaluator, few, Goal(main, float(level), 1 - main), progress)
-    chosen = _spread(evaluator, settings.front)
+            results.append(_best(evaluator, few, goal, progress))
+    chosen = _spread(evaluator, results, settings.front)
     if not chosen:
         return [Chosen(first)]
-    proved = [
-        _proved(evaluator, settings, Goal(main, evaluator.worth(one, 1 - main), 1 - main), one, progress)
-        for one in chosen
-    ]
-    return sorted(proved, key=lambda one: -evaluator.worth(one.evaluation, 0))
+    proved = [_proved(evaluator, settings, _goal_of(evaluator, one, main), one, progress) for one in chosen]
+    on_front = front_of(_worths(evaluator, [one.evaluation for one in proved]))
+    return sorted(itertools.compress(proved, on_front), key=lambda one: -evaluator.worth(one.evaluation, 0))
 
 
-def _spread(evaluator: Evaluator, count: int) -> list[Evaluation]:
-    # Robots of the front, at most so many, spread evenly by the first objective.
+def _goal_of(evaluator: Evaluator, one: Evaluation, main: int) -> Goal:
+    return Goal(main, evaluator.worth(one, 1 - main), 1 - main)
+
+
+def _worths(evaluator: Evaluator, robots: Sequence[Evaluation]) -> Float[np.ndarray, "n 2"]:
+    return np.array([[evaluator.worth(one, i) for i in (0, 1)] for one in robots]).reshape(-1, 2)
+
+
+def _spread(evaluator: Evaluator, results: list[Evaluation], count: int) -> list[Evaluation]:
+    # Results that no robot surpasses in both objectives; where numbers jump, then others of that kind, far from these.
     good = [one for one in evaluator.record.values() if one.missed == 0.0]
     if not good:
         return []
-    values = np.array([[evaluator.worth(one, i) for i in (0, 1)] for one in good])
-    front = [evaluator.one(one.point) for one, is_best in zip(good, front_of(values), strict=True) if is_best]
-    front = sorted((one for one in front if one.missed == 0.0), key=lambda one: -evaluator.worth(one, 0))
-    worths = np.array([evaluator.worth(one, 0) for one in front])
-    if len(front) <= count:
-        return front
-    nearest = [int(np.abs(worths - level).argmin()) for level in np.linspace(worths[0], worths[-1], count)]
-    return [front[i] for i in dict.fromkeys(nearest)]
+    front = list(itertools.compress(good, front_of(_worths(evaluator, good))))
+    points, scale = {one.point for one in results}, np.ptp(_worths(evaluator, front), axis=0) + 1e-300
+
+    def gap(one: Evaluation) -> float:
+        distances = (_worths(evaluator, chosen) - _worths(evaluator, [one])) / scale
+        return float(np.abs(distances).sum(1).min(initial=math.inf))
+
+    chosen = list[Evaluation]()
+    for one in front:
+        if one.point in points and gap(one) > NEAR:
+            chosen.append(one)
+    others = [one for one in front if one.point not in points]
+    while others and len(chosen) < count and not all(question.is_smooth for question in evaluator.objectives):
+        chosen.append(others.pop(int(np.argmax([gap(one) for one in others]))))
+    exact = [evaluator.one(one.point) for one in chosen]
+    return [one for one in exact if one.missed == 0.0]
 
 
 def _proved(evaluator: Evaluator, settings: SearchKeys, goal: Goal, best: Evaluation, progress: Progress) -> Chosen:
@@ -152,7 +172,7 @@ def _proved(evaluator: Evaluator, settings: SearchKeys, goal: Goal, best: Evalua
             for one in evaluator.requirements
         ]
         careful = evaluator.with_requirements(requirements)
-        point = improved(careful, best.point, goal, progress.stopped).point
+        point = improved(careful, best.point, goal.relaxed(reserve), progress.stopped).point
         evaluator.count += careful.count
         there = Chosen(evaluator.one(point), proofs_of(evaluator, point), tuple(requirements))
         progress.tell(f"proofs with {100.0 * reserve:.3g} % in reserve: {'all' if there.is_proved else 'some open'}")

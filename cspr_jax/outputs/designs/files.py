@@ -9,7 +9,7 @@ from cspr_jax import __version__
 from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import printable
-from cspr_jax.outputs.designs.report import design_object, number, question_words, state_words, unit_of
+from cspr_jax.outputs.designs.report import design_object, held_lines, number, question_words, state_words, unit_of
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import publish
 from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting
@@ -41,7 +41,7 @@ def designed_text(search: DesignSearch, robot: DesignedRobot) -> str:
         f"{question_words(search, question)}: {number(value)} {unit_of(search, question)}".rstrip()
         for question, value in zip(search.questions, robot.values, strict=True)
     ]
-    head += [f"{one.parameter} is held by {one.by}" for one in robot.sensitivities.holdings]
+    head += held_lines(robot)
     return _text(head, robot.robot_file)
 
 

@@ -116,7 +116,7 @@ def design_lines(search: DesignSearch) -> list[str]:
     for proof in best.proofs:
         state = "proved in all" if proof.is_whole else f"proved in {proof.proved} of"
         lines.append(f"{proof.name}: {state} {proof.cells} full cells")
-    lines += [f"{one.parameter} is held by {one.by}" for one in best.sensitivities.holdings]
+    lines += held_lines(best)
     if search.settings:
         changes = len(search.settings) - 1
         lines.append(f"fewest changes between tasks: {changes}")
@@ -125,6 +125,17 @@ def design_lines(search: DesignSearch) -> list[str]:
             f"{one.tasks[0]} alone: {values_words(one)}, {search.questions[0].name} {number(one.value)}"
             for one in search.alone
         ]
+    return lines
+
+
+def held_lines(robot: DesignedRobot) -> list[str]:
+    """Lines about what holds the parameters of a robot."""
+    parameters: dict[str, list[str]] = {}
+    for one in robot.sensitivities.holdings:
+        parameters.setdefault(one.by, []).append(one.parameter)
+    lines = []
+    for by, (*others, last) in parameters.items():
+        lines.append(f"{', '.join(others)} and {last} are held by {by}" if others else f"{last} is held by {by}")
     return lines
 
 
