@@ -114,7 +114,7 @@ def good():
     values = {"robot": robot, "problem": cspr_jax.make_problem(robot), "motion": motion, "state": zeros, "tau": 0.5}
     values |= dict.fromkeys(("start", "end", "control_point", "target", "place", "centre", "a", "b"), point)
     values |= dict.fromkeys(("targets", "positions", "starts", "ends", "control_points", "accelerations"), many)
-    values |= {"centres": many, "frequencies": 2.0}
+    values |= {"centres": many, "frequencies": 2.0, "position": point, "frequency": 2.0}
     values |= dict.fromkeys(("mass", "gravity", "duration", "z0", "arcs", "oscillations", "max_acceleration"), 1.0)
     values |= dict.fromkeys(("spool_radius", "platform_radius", "drum_radius", "pulses", "cable_error"), 1.0)
     values |= {"base_points": robot.base_points, "platform_points": robot.base_points, "inertia": np.eye(3)}

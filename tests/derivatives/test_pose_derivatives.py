@@ -1,5 +1,6 @@
 """Derivatives of values at poses by every number of random robots, against differences that know their own error."""
 
+import dataclasses
 import itertools
 
 import jax
@@ -78,6 +79,7 @@ def test_values_are_those_of_searches():
     robots, numbers = drawn("3R3T", 8, 6, seed=5)
     for k in range(6):
         robot, position, turn = moved(*jax.tree.map(lambda x, k=k: x[k], (robots, numbers)))
+        robot = dataclasses.replace(robot, centre_of_mass=np.array([0.1, -0.2, 0.15]))
         for point in ("origin", "mass-centre"):
             poses = {"point": point}
             margin = cspr_jax.workspace(robot, [position], [turn], **poses).margin[0]
@@ -93,6 +95,27 @@ def test_values_are_those_of_searches():
                 lengths = cspr_jax.pose_lengths(robot, position, turn, **poses)
                 springs = (robot.axial_stiffness + np.asarray(tensions)) / np.asarray(lengths)
                 np.testing.assert_allclose((matrix * springs) @ matrix.T, stiff.elastic[0], rtol=1e-9, atol=1e-7)
+
+
+def test_limits_that_symmetry_alone_reaches_are_followed():
+    """On a guide with two cables up and two down all limits are reached together, at a distance r, and smoothly.
+
+    r = (h1 + h3 - l2 - l4 - m g) / 4, with tensions h - r above and l + r below.
+    """
+    base = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [0.0, 0.0, 2.1], [0.0, 0.0, -2.1]])
+    robot = cspr_jax.point_mass(base, mass=1.0, gravity=5.0, pattern="1T", z_axis="up")
+
+    def tensions(highest):
+        limits = Limits(tension_min=np.full(4, 0.1), tension_max=highest)
+        return cspr_jax.pose_tensions(dataclasses.replace(robot, limits=limits), np.zeros(3))
+
+    quarter = np.full((4, 1), 0.25) * [1.0, 0.0, 1.0, 0.0]
+    signs = np.array([[-1.0], [1.0], [-1.0], [1.0]])
+    highest = np.full(4, 8.0)
+    np.testing.assert_allclose(tensions(highest), [8.0 - 2.7, 2.8, 8.0 - 2.7, 2.8], atol=1e-12)
+    wanted = signs * quarter + np.diag([1.0, 0.0, 1.0, 0.0])
+    for jacobian in (jax.jacfwd, jax.jacrev):
+        np.testing.assert_allclose(jacobian(tensions)(highest), wanted, atol=1e-12)
 
 
 def _one_sided(value, at, direction):
