@@ -96,6 +96,7 @@ def directions(pattern, numbers, seed=0):
     return found
 
 
+@np.errstate(invalid="ignore")  # a margin may be unbounded at one end of a step
 def differences(value, numbers, direction):
     """Derivatives of values (n,) along directions, by central differences, and estimates of their errors."""
     table, best = [], (np.zeros(len(direction[next(iter(direction))])), np.inf)

@@ -128,15 +128,19 @@ def _sides_at(tensions: Array, low: Array, high: Array) -> Array:
     return jnp.where(jnp.abs(tensions - low) <= near, 1.0, jnp.where(jnp.abs(tensions - high) <= near, -1.0, 0.0))
 
 
-def _independent(kernel: Array, first: Array, others: Array) -> Array:
-    """Sides of cables with independent columns of the kernel: as many as there are, those of the face first."""
-    kernel, first, others = lax.stop_gradient((kernel, first, others))
+def _independent(kernel: Array, products: Array, others: Array) -> Array:
+    """Sides of cables with independent columns of the kernel: as many as there are, those of the face first.
+
+    The relation among the cables of a face gives the limit of one of them: best, that of the largest product.
+    """
+    kernel, products, others = lax.stop_gradient((kernel, products, others))
     freedom, count = kernel.shape
-    order = jnp.argsort(jnp.where(first != 0.0, 0, jnp.where(others != 0.0, 1, 2)))
+    beyond_face = 1.0 + maximum_of(jnp.abs(products)) + jnp.where(others == 0.0, 1.0, 0.0)
+    order = jnp.argsort(jnp.where(products != 0.0, jnp.abs(products), beyond_face))
 
     def hold(carry, k):
         rest, sides = carry
-        side = jnp.where(first[k] != 0.0, first[k], others[k])
+        side = jnp.where(products[k] != 0.0, jnp.sign(products[k]), others[k])
         square = jnp.sum(rest[:, k] ** 2)
         is_held = (side != 0.0) & (square > INDEPENDENT**2)
         unit = rest[:, k] / jnp.sqrt(jnp.where(is_held, square, 1.0))
@@ -342,7 +346,8 @@ def projected(
 def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> tuple[Array, Array]:
     """Largest distance r from limits, () N: the minimum of half of each cable's range and of what each face allows.
 
-    Also the sides (n,) of the cables that are at this distance from limits there, as in `_limits_reached`.
+    Also the products (n,) of the nearest face with the cables, which are at this distance from their smallest tensions
+    where the product is positive, from their largest ones where it is negative; 0 for all other cables.
     """
     dof, count = matrix.shape
     if count == dof:
@@ -364,8 +369,8 @@ def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTens
     distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / norm, jnp.inf)
     half, narrowest = 0.5 * _smallest(high - low), jnp.arange(count) == jnp.argmin(high - low)
     is_half = (half < distance) | jnp.isnan(half)
-    sides = jnp.zeros(count).at[jnp.asarray(cables)[nearest]].set(jnp.sign(along))
-    return jnp.where(is_half, half, distance), jnp.where(is_half, jnp.where(narrowest, 1.0, 0.0), sides)
+    products = jnp.zeros(count).at[jnp.asarray(cables)[nearest]].set(along)
+    return jnp.where(is_half, half, distance), jnp.where(is_half, jnp.where(narrowest, 1.0, 0.0), products)
 
 
 def _smallest(values: Array) -> Array:
