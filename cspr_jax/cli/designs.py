@@ -41,7 +41,7 @@ def _design(options: argparse.Namespace) -> int:
         with waiting():
             prepare_jax(options)
             from cspr_jax.api.designs import design
-        stop.busy = True
+        stop.busy, stop.work, stop.results = True, "the robot", "evaluated robots"
         result = design(options.design, options.output, on_progress=warn, stopped=lambda: bool(stop))
         if stop.code is not None:
             line = f"stopped: {result.directory} holds the best robot so far; run it again to go on"

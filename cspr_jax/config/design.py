@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,7 +24,8 @@ FRAME, HALL, ROBOT, PARAMETERS, TASKS = "frame", "hall", "robot", "parameters", 
 _RESERVED = (FRAME, HALL, ROBOT, PARAMETERS, TASKS)
 _NAME = r"^[A-Za-z][A-Za-z0-9_-]*$"
 Reduction = Literal["smallest", "largest", "mean", "sum"]
-Name = Annotated[str, Field(pattern=_NAME, max_length=60)]
+LONGEST_NAME = 60
+Name = Annotated[str, Field(pattern=_NAME, max_length=LONGEST_NAME)]
 _OF = f"a name of [maps] or [plans], or {', '.join(_RESERVED)}"
 
 
@@ -42,6 +45,12 @@ class QuantityKeys(Table):
         "smallest, durations and arcs of plans by the sum, all others by the largest",
     )
 
+    @model_validator(mode="after")
+    def _needs_no_reduction(self) -> "QuantityKeys":
+        if self.quantity in ("feasible", "fraction") and self.reduce is not None:
+            raise table_error("reduce", self.reduce, f"absent: {self.quantity} is one number of all cells")
+        return self
+
 
 class ObjectiveTable(QuantityKeys):
     """A number that is to be as large or as small as can be."""
@@ -50,7 +59,7 @@ class ObjectiveTable(QuantityKeys):
 
 
 class RequirementTable(QuantityKeys):
-    """A number that every robot that is written has."""
+    """A number that robots must have."""
 
     lower: Value | None = Field(None, description="smallest value that is allowed")
     upper: Value | None = Field(None, description="largest value that is allowed")
@@ -66,7 +75,11 @@ class RequirementTable(QuantityKeys):
         if is_plain and (self.lower, self.upper) != (None, None):
             raise table_error("lower", self.lower, "absent, as upper is: feasible is required to be 1")
         if not is_plain and self.lower is None and self.upper is None:
-            raise table_error("lower", None, "given, or upper, or both")
+            raise table_error("lower", None, "a requirement needs it, or upper, or both")
+        for name in ("lower", "upper"):
+            value = getattr(self, name)
+            if self.quantity == "fraction" and value is not None and not 0.0 <= value <= 1.0:
+                raise table_error(name, value, "from 0 to 1: a fraction of cells")
         if self.lower is not None and self.upper is not None and not self.lower <= self.upper:
             raise table_error("upper", self.upper, f"a number >= lower, {shown(self.lower)}")
         if self.prove and not is_plain:
@@ -92,8 +105,8 @@ class Hall(Table):
 
     @model_validator(mode="after")
     def _has_walls(self) -> "Hall":
-        if self.corners is None and self.obstacle is None:
-            raise table_error("corners", None, "given, or [[hall.obstacle]], or both")
+        if self.corners is None and not self.obstacle:
+            raise table_error("corners", None, "a hall needs it, or [[hall.obstacle]], or both")
         if self.corners is not None and any(low >= high for low, high in zip(*self.corners, strict=True)):
             raise table_error(
                 "corners", self.corners, "[least, largest], each coordinate of the first below the second's"
@@ -145,10 +158,10 @@ class DesignFile(Table):
         description='[[parameter]]: parameters that move numbers of this file, such as "plans.lift.z0" and '
         '"maps.floor.axes.z0[0]"',
     )
-    maps: Annotated[dict[Name, dict[str, Any]], Field(max_length=MAX_TABLES)] = Field(
+    maps: dict[str, dict[str, Any]] = Field(
         {}, description='[maps.NAME]: { file = "SWEEP.toml" }, or the keys of a sweep; the robot is that of the design'
     )
-    plans: Annotated[dict[Name, dict[str, Any]], Field(max_length=MAX_TABLES)] = Field(
+    plans: dict[str, dict[str, Any]] = Field(
         {}, description='[plans.NAME]: { file = "PLAN.toml" }, or the keys of a plan; the robot is that of the design'
     )
     hall: Hall | None = Field(None, description="where spools may be")
@@ -166,17 +179,24 @@ class DesignFile(Table):
     @model_validator(mode="after")
     def _moves(self) -> "DesignFile":
         if self.parameter:
-            check_parameters(self.parameter, {"maps": self.maps, "plans": self.plans})
+            tables = {"maps": self.maps, "plans": self.plans}
+            check_parameters(self.parameter, {table: movable(tables[table]) for table in tables})
         return self
 
     @model_validator(mode="after")
     def _names(self) -> "DesignFile":
         for table in ("maps", "plans"):
+            if len(getattr(self, table)) > MAX_TABLES:
+                raise table_error(table, f"{len(getattr(self, table))} tables", f"at most {MAX_TABLES}")
             for name in getattr(self, table):
+                if not re.fullmatch(_NAME, name) or len(name) > LONGEST_NAME:
+                    raise table_error(f"{table}.{name}", "a table", "a name of letters, digits, _ and -")
                 if name in _RESERVED or (table == "plans" and name in self.maps):
                     raise table_error(
                         f"{table}.{name}", "a table", f"another name than {', '.join(_RESERVED)} and maps"
                     )
+        if len(self.objective) == 2 and self.objective[0] == self.objective[1]:
+            raise table_error("objective[1]", "a table", "another objective than the first")
         names = [*self.maps, *self.plans, *_RESERVED]
         for key in ("objective", "requirement"):
             for i, one in enumerate(getattr(self, key)):
@@ -201,6 +221,11 @@ class DesignFile(Table):
         if len(self.objective) > 1:
             raise table_error("objective", f"{len(self.objective)} tables", "one beside [reconfigure]")
         return self
+
+
+def movable(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Maps or plans without keys whose numbers do not move."""
+    return {name: {key: value for key, value in spec.items() if key != "schema"} for name, spec in tables.items()}
 
 
 def read_design(path: Path) -> tuple[DesignFile, dict[str, Any]]:
@@ -235,5 +260,7 @@ def _with_files(tables: dict[str, Any], key: str, path: Path) -> dict[str, Any]:
         if len(table) > 1 or not isinstance(table["file"], str):
             raise ConfigError(path, f'{key}.{name}: must be {{ file = "FILE.toml" }} alone, or keys without file')
         inner = read_toml(path.parent / table["file"])
-        contents[name] = {other: value for other, value in inner.items() if other not in ("robot", "parameters")}
+        contents[name] = {
+            other: value for other, value in inner.items() if other not in ("robot", "parameters", "parameter")
+        }
     return contents

@@ -19,9 +19,9 @@ CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATE
 GRACE_SECONDS = 1.2
 # Time for a tile in progress after SIGTERM.
 TILE_SECONDS = 8.0
-FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
+FINISHING = "finishing {work} in progress; Ctrl-C again ends at once"
 STOPPING = "stopping; Ctrl-C again ends at once"
-TERMINATING = f"SIGTERM: waiting up to {TILE_SECONDS:.0f} s for the tile in progress"
+TERMINATING = f"SIGTERM: waiting up to {TILE_SECONDS:.0f} s for {{work}} in progress"
 # Clears the line of a progress display, and shows the cursor that it hid.
 _TIDY = b"\r\x1b[2K\x1b[?25h"
 
@@ -35,6 +35,8 @@ class Stop:
         at_once: function that is called before the process ends at a second signal.
         note: likewise, for an entry in a log.
         tell: function that is called with a line for the user after the first signal.
+        work: what must be finished, in words.
+        results: what is kept, in words.
     """
 
     def __init__(self) -> None:
@@ -44,6 +46,7 @@ class Stop:
         self.at_once: Callable[[], None] = lambda: None
         self.note: Callable[[], None] = lambda: None
         self.tell: Callable[[str], None] = lambda line: None
+        self.work, self.results = "the tile", "finished tiles"
 
     def __bool__(self) -> bool:
         return self.code is not None
@@ -54,7 +57,7 @@ class Stop:
         if self.code is None:
             self.code = CODES[signal.Signals(number)]
             finishing = TERMINATING if self.code is ExitCode.TERMINATED else FINISHING
-            self.tell(finishing if self.busy else STOPPING)
+            self.tell(finishing.format(work=self.work) if self.busy else STOPPING)
             return
         self.end(CODES[signal.Signals(number)])
 
@@ -64,7 +67,7 @@ class Stop:
         self.note()
         self.at_once()
         signal_name = "SIGTERM: " if code is ExitCode.TERMINATED else ""
-        line = f"cspr: {signal_name}stopped at once; finished tiles are kept, run it again to go on\n"
+        line = f"cspr: {signal_name}stopped at once; {self.results} are kept, run it again to go on\n"
         _end(code, line.encode())
 
 

@@ -6,6 +6,8 @@ of cells with a margin above zero, up to those next to it.
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -26,7 +28,10 @@ def counted(evaluator: Evaluator, start: Point, goal: Goal, stopped: Callable[[]
     from scipy.optimize import minimize  # loads much of SciPy
 
     space, question = evaluator.space, evaluator.objectives[goal.objective]
-    pieces = [piece for one in evaluator.requirements if one.is_smooth for piece in pieces_of(one)]
+    pieces = [piece for one in evaluator.requirements for piece in pieces_of(one)]
+    if math.isfinite(goal.level):
+        of_other = pieces_of(evaluator.objectives[goal.other])
+        pieces += [dataclasses.replace(piece, offset=-goal.level) for piece in of_other]
     best = evaluator.one(start)
     for width in WIDTHS:
         if stopped():

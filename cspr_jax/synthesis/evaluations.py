@@ -47,7 +47,7 @@ class Evaluator:
         space: robots of the design.
         objectives: what is to be large or small.
         requirements: what must hold.
-        count: number of robots that were evaluated, those of an earlier process not among them.
+        count: number of evaluations of all or some of a robot's numbers, by which searches are compared.
         record: all evaluations that were asked for, by their points, in their order.
         known: evaluations of an earlier process, by point and by whether robots were lanes.
         on_new: function that is called with evaluations that are new.
@@ -164,7 +164,7 @@ class Goal:
             short = self.level - evaluator.worth(evaluation, self.other)
             magnitude = abs(self.level) or 1.0
             missed += short / magnitude if short > ROUNDING * magnitude else 0.0
-        cost = -worth if math.isfinite(worth) else math.inf
+        cost = math.inf if math.isnan(worth) else -worth
         return (missed, -evaluation.slack, cost) if missed > 0.0 else (missed, cost, -evaluation.slack)
 
 
@@ -173,10 +173,12 @@ FIRST = Goal()
 
 
 def front_of(values: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, "n"]:
-    """Tell which pairs, of which more is better, no other pair surpasses in both."""
-    order = np.lexsort((-values[:, 1], -values[:, 0]))
+    """Tell which pairs, of which more is better, no other pair surpasses in both, up to rounding."""
+    finite = np.where(np.isfinite(values), np.abs(values), 0.0)
+    unit = ROUNDING * np.maximum(finite.max(0, initial=0.0), 1e-300)
+    rounded = np.round(values / unit)
     best, is_best = -math.inf, np.zeros(len(values), bool)
-    for i in order:
-        if values[i, 1] > best:
-            best, is_best[i] = values[i, 1], True
+    for i in np.lexsort((-rounded[:, 1], -rounded[:, 0])):
+        if rounded[i, 1] > best:
+            best, is_best[i] = rounded[i, 1], True
     return is_best

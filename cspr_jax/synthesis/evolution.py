@@ -63,7 +63,9 @@ def evolved(
 
 def _cost(rank: tuple[float, float, float], evaluation: Evaluation) -> float:
     missed, worth, _ = rank
-    if missed > 0.0 or not math.isfinite(worth):
+    if missed > 0.0 or math.isnan(worth) or worth == math.inf:
         return MISSED * (1.0 + min(missed, MISSED))
+    if math.isinf(worth):
+        return -MISSED
     slack = evaluation.slack if math.isfinite(evaluation.slack) else 0.0
     return worth - TIE * max(abs(worth), 1.0) * math.tanh(slack)

@@ -96,8 +96,8 @@ def _constraints(evaluator: Evaluator, point: Point, goal: Goal) -> list[_Constr
     objective = evaluator.objectives[goal.objective]
     pieces = [(piece, True) for piece in pieces_of(objective)]
     if math.isfinite(goal.level):
-        other = evaluator.objectives[goal.other]
-        pieces += [(dataclasses.replace(piece, offset=-goal.level), False) for piece in pieces_of(other)]
+        for piece in pieces_of(evaluator.objectives[goal.other]):
+            pieces.append((dataclasses.replace(piece, offset=-goal.level), False))
     pieces += [
         (piece, False) for question in evaluator.requirements if question.is_smooth for piece in pieces_of(question)
     ]

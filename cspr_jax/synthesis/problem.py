@@ -46,6 +46,23 @@ class Problem:
             for name in self._names_of(table.of):
                 self._check(key, name, table)
         self._check_tasks()
+        self._check_bounds()
+
+    def _check_bounds(self) -> None:
+        # At the bounds of each parameter of the file alone its maps and plans must be valid.
+        for i, table in enumerate(self.space.of_file):
+            if table.name not in self.space.names:
+                continue
+            k = self.space.names.index(table.name)
+            for bound in ("lower", "upper"):
+                values = list(self.space.first.values)
+                values[k] = getattr(table, bound)
+                try:
+                    for measure in self._measures.values():
+                        measure.check_at(self.space.first._replace(values=tuple(values)))
+                except ConfigError as error:
+                    allowed = f"must be a value that gives valid maps and plans ({error.lines[0]})"
+                    raise ConfigError(self.file, f"parameter[{i}].{bound} = {shown(values[k])}: {allowed}") from error
 
     def _names_of(self, name: str) -> list[str]:
         # Names of the maps, plans and other tables that a name stands for.
@@ -53,12 +70,12 @@ class Problem:
 
     def _check(self, key: str, name: str, table: QuantityKeys) -> None:
         proves = _proves(table)
-        if proves and name not in self.design.maps:
-            raise ConfigError(self.file, f"{key}.prove: must be absent: {name} is no map of a workspace")
         try:
             if (name, proves) not in self._measures:
                 self._measures[name, proves] = self._measure(name, proves=proves)
             self._measures[name, proves].check(table.quantity)
+            if proves:
+                self._measures[name, proves].check_proofs()
         except InputError as error:
             raise ConfigError(self.file, f"{key}.{error}") from error
 

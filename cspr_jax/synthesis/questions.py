@@ -93,11 +93,11 @@ class Question:
 
     @property
     def is_smooth(self) -> bool:
-        """Tell whether the number, or what decides it, has derivatives."""
+        """Tell whether the number, or what decides it, has derivatives; of a fraction that is required, margins do."""
         if self.quantity == FEASIBLE and self.reduction == "smallest":
             return bool(self.measure.slacks())
         if self.quantity == FRACTION:
-            return bool(self.measure.slacks()) and self.sense == 0
+            return bool(self.measure.slacks()) and self.sense == 0 and self.low > 0.0
         return not self.measure.jumps(self.quantity)
 
 
@@ -152,6 +152,8 @@ class Piece:
 
 def pieces_of(question: Question) -> list[Piece]:
     """Smooth functions that decide an objective (the smallest is to be large) or a requirement (none is negative)."""
+    if not question.is_smooth:
+        return []
     if question.quantity in (FEASIBLE, FRACTION):
         reserves = question.reserves
         return [

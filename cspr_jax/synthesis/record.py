@@ -6,8 +6,9 @@ import contextlib
 import csv
 import io
 import json
+import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from cspr_jax.errors import RefusedError, StoreError, printable
@@ -31,24 +32,32 @@ class DesignRecord:
         """Keep the directory."""
         self.path, self._folder, self._disk = folder.path, folder, disk
 
-    def take_up(self, evaluator: Evaluator, groups: str = "") -> int:
+    def take_up(self, evaluator: Evaluator, groups: str = "", stopped: Callable[[], bool] = lambda: False) -> int:
         """Give an evaluator what an earlier process found, and keep what it finds; return how many there were.
 
-        Evaluators of several divisions into groups have tables of their own.
+        Evaluators of several divisions into groups have tables of their own. What a search that is stopped evaluates
+        only to close is not kept, so that lines have the order of a search that is not.
         """
         table = self.path / (f"evaluations-{digest(groups)[:12]}.csv" if groups else TABLE)
         count = self._read(table, evaluator) if table.exists() else self._append(table, [header(evaluator)])
 
         def keep(new: list[Evaluation]) -> None:
-            self._append(table, [words_of(evaluator, one) for one in new])
+            if not stopped():
+                self._append(table, [line_of(evaluator, one) for one in new])
 
         evaluator.on_new = keep
         return count
 
     def _read(self, table: Path, evaluator: Evaluator) -> int:
         count, complete = 0, _whole_lines(table)
-        lines = list(csv.reader(io.StringIO(complete, newline="")))
-        if not lines or lines[0] != header(evaluator):
+        try:
+            lines = list(csv.reader(io.StringIO(complete, newline="")))
+        except csv.Error as error:
+            raise StoreError(printable(f"{table}: is no table of evaluations ({error}): remove it")) from error
+        if not lines:  # the first line was not finished
+            publish(self._disk, table, b"")
+            return self._append(table, [header(evaluator)])
+        if lines[0] != header(evaluator):
             raise RefusedError(printable(f"{table}: is not the table of this design: choose another -o"))
         for number, words in enumerate(lines[1:], start=2):
             try:
@@ -114,10 +123,13 @@ def _whole_lines(path: Path) -> str:
     try:
         if path.stat().st_size > LARGEST:
             raise StoreError(printable(f"{path}: is larger than any table of a design"))
-        text = path.read_text("utf-8", errors="replace")
+        data = path.read_bytes()
     except OSError as error:
         raise StoreError(printable(f"{path}: cannot be read: {error.strerror or error}")) from error
-    return text[: text.rfind("\n") + 1]
+    try:
+        return data[: data.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise StoreError(printable(f"{path}: is not UTF-8 text: remove it, or choose another -o")) from error
 
 
 def header(evaluator: Evaluator) -> list[str]:
@@ -126,7 +138,7 @@ def header(evaluator: Evaluator) -> list[str]:
     return [*evaluator.space.names, ARRANGEMENT, *questions, *_LAST]
 
 
-def words_of(evaluator: Evaluator, one: Evaluation) -> list[str]:
+def line_of(evaluator: Evaluator, one: Evaluation) -> list[str]:
     """A line of the table."""
     numbers = [*map(repr, one.point.values), str(one.point.arrangement), *map(repr, one.values)]
     return [*numbers, repr(one.missed), repr(one.slack), str(int(one.is_screened)), " ".join(one.problem.split())]
@@ -142,6 +154,8 @@ def evaluation_of(evaluator: Evaluator, words: list[str]) -> Evaluation:
     if len(words) != count + 1 + questions + len(_LAST):
         raise ValueError("columns")
     point = Point(tuple(map(float, words[:count])), int(words[count]))
+    if not all(map(math.isfinite, point.values)):
+        raise ValueError("parameters")
     values = tuple(map(float, words[count + 1 : count + 1 + questions]))
     missed, slack, screened, problem = words[count + 1 + questions :]
     return Evaluation(point, values, float(missed), float(slack), problem, screened == "1")

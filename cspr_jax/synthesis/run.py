@@ -8,6 +8,7 @@ from typing import Any
 
 from cspr_jax import __version__
 from cspr_jax.config.design import DesignFile
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.synthesis.evaluations import Evaluator
@@ -21,6 +22,8 @@ from cspr_jax.synthesis.sensitivities import sensitivities_of
 
 # Version of what is searched, and how: results of another one are not mixed.
 METHOD = 1
+# Largest number of characters of a robot's name.
+LONGEST_NAME = 200
 
 
 def run_design(
@@ -37,7 +40,7 @@ def run_design(
         with opened(directory, identity_of(content, problem), file) as record:
 
             def prepare(evaluator: Evaluator, groups: str = "") -> None:
-                count = record.take_up(evaluator, groups)
+                count = record.take_up(evaluator, groups, progress.stopped)
                 if count:
                     progress.tell(f"{count} evaluations of an earlier run are taken up")
 
@@ -84,12 +87,17 @@ def _settings(division: Division, names: list[str]) -> list[Setting]:
             Setting(
                 name,
                 tasks,
-                robot_file.model_copy(update={"name": f"{robot_file.name}-{name.replace('_', '-')}"}),
+                _named(robot_file, name),
                 dict(zip(space.base.names, point.values, strict=True)),
                 evaluation.values[0],
             )
         )
     return settings
+
+
+def _named(robot_file: RobotFile, name: str) -> RobotFile:
+    ending = f"-{name.replace('_', '-')}"
+    return robot_file.model_copy(update={"name": robot_file.name[: LONGEST_NAME - len(ending)] + ending})
 
 
 def designed(evaluator: Evaluator, chosen: Chosen, name: str) -> DesignedRobot:
@@ -99,10 +107,9 @@ def designed(evaluator: Evaluator, chosen: Chosen, name: str) -> DesignedRobot:
     space = evaluator.space
     point = space.of_group(evaluation.point, 0) if isinstance(space, GroupedSpace) else evaluation.point
     robot_file = (space.base if isinstance(space, GroupedSpace) else space).robot_at(point)
-    file_name = f"{robot_file.name}-{name.replace('_', '-')}"
     return DesignedRobot(
         name=name,
-        robot_file=robot_file.model_copy(update={"name": file_name}),
+        robot_file=_named(robot_file, name),
         parameters=parameters_at(evaluator, evaluation.point),
         arrangement=evaluation.point.arrangement,
         values=evaluation.values,

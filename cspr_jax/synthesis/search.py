@@ -80,8 +80,7 @@ def _best(evaluator: Evaluator, settings: SearchKeys, goal: Goal, progress: Prog
     questions = [objective, *evaluator.requirements]
     questions += [evaluator.objectives[goal.other]] if math.isfinite(goal.level) else []
     results = list(starts)
-    counts = objective.quantity == FRACTION and bool(objective.measure.slacks())
-    climb = improved if objective.is_smooth else counted if counts else None
+    climb = _climb_of(objective)
     for i, start in enumerate(starts if climb is not None and evaluator.space.names else ()):
         if progress.stopped() or climb is None:
             break
@@ -95,6 +94,22 @@ def _best(evaluator: Evaluator, settings: SearchKeys, goal: Goal, progress: Prog
         results.insert(0, evolved(evaluator, results, goal, settings.generations, progress.stopped))
         progress.tell(f"differential evolution{_words(evaluator, results[0])}")
     return evaluator.one(min(results, key=lambda one: goal.rank(evaluator, one)).point)
+
+
+def _climbed(
+    evaluator: Evaluator, settings: SearchKeys, start: Evaluation, goal: Goal, progress: Progress
+) -> Evaluation:
+    # A better robot near one, by the search that suits the objective.
+    climb = _climb_of(evaluator.objectives[goal.objective])
+    if climb is not None:
+        return climb(evaluator, start.point, goal, progress.stopped)
+    return evolved(evaluator, [start], goal, settings.generations, progress.stopped)
+
+
+def _climb_of(objective: Question) -> Callable[..., Evaluation] | None:
+    # Local search for an objective; None where it jumps.
+    counts = objective.quantity == FRACTION and bool(objective.measure.slacks())
+    return improved if objective.is_smooth else counted if counts else None
 
 
 def _agree(evaluator: Evaluator, results: list[Evaluation], goal: Goal) -> bool:
@@ -172,7 +187,7 @@ def _proved(evaluator: Evaluator, settings: SearchKeys, goal: Goal, best: Evalua
             for one in evaluator.requirements
         ]
         careful = evaluator.with_requirements(requirements)
-        point = improved(careful, best.point, goal.relaxed(reserve), progress.stopped).point
+        point = _climbed(careful, settings, best, goal.relaxed(reserve), progress).point
         evaluator.count += careful.count
         there = Chosen(evaluator.one(point), proofs_of(evaluator, point), tuple(requirements))
         progress.tell(f"proofs with {100.0 * reserve:.3g} % in reserve: {'all' if there.is_proved else 'some open'}")

@@ -29,7 +29,7 @@ class Holding:
     Fields:
         parameter: name of the parameter.
         by: what holds it, in words.
-        price: by how much the objective would change for each unit of the parameter, if it were not held.
+        price: by how much the objective would change with each unit of the parameter, if this did not hold it.
     """
 
     parameter: str
@@ -87,7 +87,7 @@ def sensitivities_of(evaluator: Evaluator, point: Point, objective: int = 0) -> 
                 levels += [_Active(words_of(piece, point, elements[k]), derivatives[k]) for k in near]
             elif not question.sense:
                 active += [_Active(words_of(piece, point, elements[k]), derivatives[k]) for k in near]
-    return DesignSensitivities(rows, *_held(evaluator, point, levels, active, ranges))
+    return DesignSensitivities(rows, *_held(evaluator, point, objective, levels, active, ranges))
 
 
 def _near(values: np.ndarray, derivatives: np.ndarray, level: float) -> np.ndarray:
@@ -96,11 +96,11 @@ def _near(values: np.ndarray, derivatives: np.ndarray, level: float) -> np.ndarr
 
 
 def _held(
-    evaluator: Evaluator, point: Point, levels: list[_Active], active: list[_Active], ranges: np.ndarray
+    evaluator: Evaluator, point: Point, objective: int, levels: list[_Active], active: list[_Active], ranges: np.ndarray
 ) -> tuple[tuple[Holding, ...], float]:
     from scipy.optimize import nnls  # loads much of SciPy
 
-    space, count = evaluator.space, len(ranges)
+    space, count, sense = evaluator.space, len(ranges), evaluator.objectives[objective].sense
     if not levels or not count:
         return (), math.nan
     fractions = space.fractions(point)
@@ -129,7 +129,7 @@ def _held(
             continue
         prices = weight * one.derivative * magnitude / norm / ranges
         for i in np.flatnonzero(np.abs(prices) > WEIGHT * np.abs(prices).max(initial=0.0)):
-            holdings.append(Holding(space.names[i], one.words, float(-prices[i])))
+            holdings.append(Holding(space.names[i], one.words, float(-sense * prices[i])))
     return tuple(sorted(holdings, key=lambda one: (space.names.index(one.parameter), -abs(one.price)))), residual
 
 

@@ -111,9 +111,9 @@ class RobotSpace:
         except InputError as error:
             raise UnsuitableRobotError(str(error)) from error
 
-    def moves(self, table: str, name: str) -> bool:
-        """Tell whether variables move numbers of a map or plan."""
-        start = f"{table}.{name}."
+    def moves(self, table: str, name: str, key: str = "") -> bool:
+        """Tell whether variables move numbers of a map or plan, or of one of its keys."""
+        start = f"{table}.{name}.{key}"
         return any(target.startswith(start) for one in self.of_file for target in one.moves if one.name in self.names)
 
     def table_at(self, point: Point, table: str, name: str) -> dict[str, Any]:

@@ -16,7 +16,18 @@ from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import RefusedError, StoreError
 from cspr_jax.synthesis.evaluations import front_of
-from tests.synthesis.problems import EIGHT, FEASIBLE, MARGIN, PLANAR, PROBLEMS, RECTANGLE, design, objective
+from tests.synthesis.problems import (
+    BODY,
+    EIGHT,
+    FEASIBLE,
+    MARGIN,
+    PLANAR,
+    PROBLEMS,
+    RECTANGLE,
+    design,
+    objective,
+    parameter,
+)
 
 WIDE = objective("frame", "extent_x", "smallest")
 BOTH = PROBLEMS["planar margin"] | {"objective": [MARGIN, WIDE], "requirement": [FEASIBLE], "search": {"front": 4}}
@@ -72,6 +83,79 @@ def test_a_fraction_of_cells(tmp_path):
     assert best.values[0] == pytest.approx(max(fractions))
 
 
+@pytest.mark.parametrize("bounds", [{"upper": 0.5}, {"lower": 0.0}, {"lower": 0.4, "upper": 0.9}], ids=str)
+def test_fractions_as_requirements(tmp_path, bounds):
+    data = design(PLANAR, WIDE, [{"of": "places", "quantity": "fraction", **bounds}], maps={"places": RECTANGLE})
+    result = cspr_jax.design(data | {"search": {"screen": 16, "generations": 2}}, tmp_path / "out")
+    assert result.feasible and bounds.get("lower", 0.0) <= result.best.values[1] <= bounds.get("upper", 1.0)
+
+
+def test_the_front_of_a_fraction(tmp_path):
+    """Neither objective is surpassed by another robot of the front; numbers that jump need no derivatives."""
+    data = design(PLANAR, WIDE, maps={"places": RECTANGLE}, search={"screen": 16, "generations": 2, "front": 4})
+    data["objective"] = [objective("places", "fraction", "largest"), WIDE]
+    result = cspr_jax.design(data, tmp_path / "out")
+    fractions, widths = np.array([robot.values for robot in result.robots]).T
+    assert (np.diff(fractions) < 0).all() and (np.diff(widths) < 0).all() and fractions[0] == 1.0
+
+
+def test_margins_without_end_are_the_best(tmp_path):
+    """Cables without a largest tension hold a body between upper and lower spools with any margin."""
+    drop = parameter("drop", 0.2, 0.1, 4.0, {"base_points[2][2]": 1, "base_points[3][2]": 1})
+    points = [[-2, 0, 0], [2, 0, 0], [2, 0, 0], [-2, 0, 0]]
+    robot = BODY | {"base_points": points, "parameter": [drop]}
+    places = {"map": "workspace", "axes": {"x": [0], "y": [0], "z": [1.0]}, "limits": {"tension_min": 1}}
+    result = cspr_jax.design(design(robot, MARGIN, maps={"places": places}), tmp_path / "out")
+    assert result.best.values[0] == np.inf and not result.best.sensitivities.holdings
+
+
+def prices_of(result):
+    return {one.by: one.price for one in result.best.sensitivities.holdings}
+
+
+def test_prices_are_changes_of_the_objective(tmp_path):
+    """A smaller width needs a smaller bound, and costs nothing else."""
+    result = cspr_jax.design(design(PLANAR, WIDE, maps={"places": RECTANGLE}), tmp_path / "out")
+    assert prices_of(result) == {"its lower bound, 1": pytest.approx(1.0)}
+    largest = objective("frame", "extent_x", "largest")
+    result = cspr_jax.design(design(PLANAR, largest, maps={"places": RECTANGLE}), tmp_path / "largest")
+    assert prices_of(result) == {"its upper bound, 8": pytest.approx(1.0)}
+
+
+def test_words_name_cells_that_parameters_move(tmp_path):
+    moves = {"maps.places.axes.x.start": -1, "maps.places.axes.x.stop": 1}
+    half = parameter("half", 0.8, 0.1, 0.8, moves)
+    data = PROBLEMS["planar margin"] | {"parameter": [half], "search": {"screen": 8, "starts": 1}}
+    best = cspr_jax.design(data, tmp_path / "out").best
+    assert best.parameters["half"] == pytest.approx(0.1)
+    words = [one.by for one in best.sensitivities.holdings if "at x = " in one.by]
+    assert words and all(abs(float(text.partition("x = ")[2].partition(",")[0])) <= 0.1 for text in words)
+
+
+def test_robots_that_some_values_do_not_give(tmp_path):
+    """A parameter moves another one, and both together pass its bounds: then robots are no lanes."""
+    chain = parameter("chain", 0.0, -0.2, 0.2, {"parameter.width": 4.0})
+    data = PROBLEMS["planar margin"] | {"robot": PLANAR | {"parameter": [*PLANAR["parameter"], chain]}}
+    best = cspr_jax.design(data | {"search": {"screen": 16, "starts": 1}}, tmp_path / "out").best
+    assert best.values[0] == pytest.approx(4.466455, rel=1e-3)
+
+
+def test_a_search_that_is_stopped_at_once(tmp_path):
+    result = cspr_jax.design(PROBLEMS["planar width"], tmp_path / "out", stopped=lambda: True)
+    assert not result.to_dict()["complete"] and result.best.parameters["width"] == 2.0
+    assert cspr_jax.design(PROBLEMS["planar width"], tmp_path / "out").to_dict()["complete"]
+
+
+def test_long_names_and_short_tables(tmp_path):
+    data = PROBLEMS["planar width"] | {"robot": PLANAR | {"name": "n" * 200}}
+    cspr_jax.design(data, tmp_path / "out")
+    assert cspr_jax.load_robot(tmp_path / "out" / "best.toml").name.endswith("n-best")
+    before = files_of(tmp_path / "out")
+    (tmp_path / "out" / "evaluations.csv").write_bytes(b"wid")
+    cspr_jax.design(data, tmp_path / "out")
+    assert files_of(tmp_path / "out") == before
+
+
 def test_arrangements_beside_parameters(tmp_path):
     """The best arrangement is found among all that are listed, with the parameters that suit it."""
     plain = EIGHT | {"parameter": EIGHT["parameter"][1:2]}
@@ -92,12 +176,7 @@ def test_a_stopped_search_goes_on_to_the_same_files(tmp_path, count):
     stopped = cspr_jax.design(BOTH, tmp_path / "twice", stopped=lambda: next(asked) > count)
     assert not stopped.to_dict()["complete"]
     cspr_jax.design(BOTH, tmp_path / "twice")
-    once, twice = files_of(tmp_path / "at once"), files_of(tmp_path / "twice")
-    assert {name: data for name, data in once.items() if name != "evaluations.csv"} == {
-        name: data for name, data in twice.items() if name != "evaluations.csv"
-    }
-    lines = [sorted(files["evaluations.csv"].splitlines()) for files in (once, twice)]
-    assert set(lines[0]) <= set(lines[1])
+    assert files_of(tmp_path / "at once") == files_of(tmp_path / "twice")
 
 
 def test_directories_of_others_are_refused(tmp_path):

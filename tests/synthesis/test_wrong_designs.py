@@ -6,11 +6,15 @@ import pytest
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from tests.synthesis.problems import FEASIBLE, PROBLEMS, parameter
+from tests.synthesis.problems import FEASIBLE, LIFT, PROBLEMS, parameter
 
 WIDTH = PROBLEMS["planar width"]
 OF_AXIS = parameter("z", 1, 0, 2, {"maps.places.axes.z": 1})
 OF_LIMIT = parameter("width", 1, 0, 2, {"maps.places.limits.tension_max": 1})
+OF_POINT = parameter("x", 0.5, 0.4, 0.6, {"maps.places.axes.z.start": 1})
+OF_STRENGTH = parameter("strength", 30, -10, 50, {"maps.places.limits.tension_max": 1})
+LIFTS = {"plans": {"lift": LIFT}}
+QUANTITY = "requirement[0].quantity"
 EMPTY = {"of": "frame", "quantity": "extent_x", "lower": 2, "upper": 1}
 # Changes of the file, by their dotted keys, and parts of the line.
 MISTAKES = [
@@ -40,7 +44,19 @@ MISTAKES = [
     ({"search": {"screen": 0}}, "search.screen = 0", "at least 1"),
     ({"searches": {}}, "searches", "did you mean search?"),
     ({"robot.parameter": None}, "parameters", "there are none"),
-    ({"requirement.0": FEASIBLE | {"prove": True, "of": "frame"}}, "requirement[0].prove", "no map of a workspace"),
+    ({"requirement.0": FEASIBLE | {"prove": True, "of": "lift"}, **LIFTS}, "[0].prove", "no map of a workspace"),
+    ({"requirement.0.prove": True, "parameter": [OF_POINT]}, "requirement[0].prove", "parameters move its axes"),
+    ({"requirement.0.reduce": "largest"}, "requirement[0].reduce = largest", "absent"),
+    ({"requirement.0": {"of": "places", "quantity": "fraction", "lower": 2}}, "requirement[0].lower", "from 0 to 1"),
+    ({"requirement.0": {"of": "places", "quantity": "verdict", "upper": 0}}, QUANTITY, "stand for words"),
+    ({"requirement.0": {"of": "places", "quantity": "clearance", "lower": 0}}, QUANTITY, "another one without"),
+    ({"requirement.0": {"of": "lift", "quantity": "arcs", "upper": 3}, **LIFTS}, QUANTITY, "have no arcs"),
+    ({"objective": [WIDTH["objective"][0]] * 2}, "objective[1]", "another objective than the first"),
+    ({"maps.places.axes.parameter": {"width": [1, 2]}}, "axes.parameter.width", "the design has the robots"),
+    ({"parameter": [OF_STRENGTH]}, "parameter[0].lower = -10", "a value that gives valid maps and plans"),
+    ({"parameter": [parameter("s", 1, 1, 2, {"maps.places.schema": 1})]}, "parameter[0].moves", "numbers of the file"),
+    ({"hall": {"obstacle": []}}, "hall.corners", "a hall needs it"),
+    ({"plans": {"li ft": LIFT}}, "plans.li ft", "a name of letters"),
 ]  # fmt: skip
 
 
@@ -65,6 +81,12 @@ def test_mistakes_get_one_line(tmp_path, changes, key, allowed):
         cspr_jax.design(changed(WIDTH, changes), tmp_path / "out")
     line = caught.value.lines[0]
     assert "\n" not in line and key in line and allowed in line, line
+    assert not (tmp_path / "out").exists()
+
+
+def test_cells_about_an_axis_have_no_proofs(tmp_path):
+    with pytest.raises(ConfigError, match=r"axes\.radius: cannot be combined with workspace.prove"):
+        cspr_jax.design(changed(PROBLEMS["circle"], {"requirement.0.prove": True}), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

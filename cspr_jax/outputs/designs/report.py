@@ -107,7 +107,11 @@ def design_lines(search: DesignSearch) -> list[str]:
     best = search.best
     if not math.isfinite(best.missed):
         return [*lines, f"no robot has an answer to all questions: {best.problem}"]
-    if best.missed > 0.0:
+    values = zip(search.questions, best.values, strict=True)
+    without = [question.name for question, value in values if question.sense and math.isnan(value)]
+    if without:
+        lines.append(f"{' and '.join(without)}: no robot was found that has one; the nearest one:")
+    elif best.missed > 0.0:
         lines.append("no robot meets all requirements; the one that misses them least:")
     lines += [
         f"{question_words(search, question)}: {number(value)} {unit_of(search, question)}".rstrip()

@@ -16,7 +16,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.numerics.batches import in_threads, short_batches
 from cspr_jax.numerics.shapes import Int
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import QUANTITIES, is_of_robot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.sweep.checks import is_asked
 from cspr_jax.sweep.definition import Sweep, sweep_of
@@ -26,6 +26,8 @@ from cspr_jax.synthesis.measures.measure import FEASIBLE, FRACTION, Columns, Mea
 from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 from cspr_jax.workspaces.map import WorkspaceMap
 
+# Ends of cells nearer to each other than this fraction of the extent are one.
+SAME = 1e-9
 # Margins of maps of motions; those of workspaces are `workspaces.static_poses.MARGINS`.
 _MARGINS = ("margin", "limit_margin", "det_margin", "acceleration_margin")
 # Beginnings of names of datasets that count orientations of a set.
@@ -48,10 +50,25 @@ class MapMeasure(Measure):
         self._asked = list[str]()
         self._moves = space.moves("maps", name)
         self.sweep = self._sweep(space.first)
+        for axis in filter(is_of_robot, self.sweep.grid.axes):
+            raise ConfigError(path, f"axes.{axis}: must be absent: the design has the robots")
         for quantity in quantities:
             self.check(quantity)
         self._asked = [quantity for quantity in quantities if quantity not in (FEASIBLE, FRACTION)]
         self.sweep = self._sweep(space.first)
+
+    def check_at(self, point: Point) -> None:
+        """Refuse keys that parameters of the design have moved so that they are none; see `Measure.check_at`."""
+        if self._moves:
+            self._sweep(point)
+
+    def check_proofs(self) -> None:
+        """Refuse proofs of a map that has none."""
+        if self.sweep.kind.name != "workspace":
+            raise InputError("prove", True, "absent: it is no map of a workspace")
+        if self.space.moves("maps", self._name, "axes"):
+            raise InputError("prove", True, "absent: parameters move its axes, so that there are no fixed cells")
+        TileMap(self._sweep(self.space.first, proves=True))
 
     def sides(self, point: Point) -> Int[np.ndarray, "n"]:
         """Which side each full cell is proved to be on, in maps of workspaces: 1 inside, 2 outside, 0 open."""
@@ -90,6 +107,13 @@ class MapMeasure(Measure):
         if quantity not in names:
             hint = did_you_mean(quantity, names)
             raise InputError("quantity", quantity, f"{hint}one of {', '.join(names)}")
+        if quantity not in (FEASIBLE, FRACTION):
+            row = QUANTITIES[quantity]
+            if row.meanings or row.unflagged:
+                raise InputError("quantity", quantity, "another one: its numbers stand for words")
+            conditions = self.sweep.kind.keys_of(quantity)
+            if conditions and not any(is_asked(self.sweep.spec, self.sweep.robot, key) for key in conditions):
+                raise InputError("quantity", quantity, f"another one without {' or '.join(conditions)} in the map")
 
     def slacks(self) -> tuple[str, ...]:
         """Margins of the map; see `Measure.slacks`."""
@@ -101,7 +125,13 @@ class MapMeasure(Measure):
         return quantity in counts or quantity.startswith(_OF_SETS) or QUANTITIES[quantity].kind != "float"
 
     def _columns(self, point: Point) -> Columns:
-        return with_verdicts(self._values(point, self._sweep(point) if self._moves else self.sweep))
+        return with_verdicts(self._values(point, self._sweep_at(point)))
+
+    def _sweep_at(self, point: Point) -> Sweep:
+        try:
+            return self._sweep(point) if self._moves else self.sweep
+        except ConfigError as error:
+            raise UnsuitableRobotError(str(error)) from error
 
     def _values(self, point: Point, sweep: Sweep) -> Columns:
         robot_file = self.space.robot_at(point)
@@ -115,17 +145,17 @@ class MapMeasure(Measure):
 
     def words(self, point: Point, quantity: str, element: Int[np.ndarray, "2"]) -> str:
         """The cell, with the two nearest bodies of a clearance; see `Measure.words`."""
-        at = ", ".join(f"{axis} = {values[element[1]]:.4g}" for axis, values in self.cells.items())
+        at = ", ".join(f"{axis} = {values[element[1]]:.4g}" for axis, values in self.cells_at(point).items())
         detail = self._detail(point, quantity, element)
         return f"at {at}" + (f" ({detail})" if detail else "")
 
     def _detail(self, point: Point, quantity: str, element: np.ndarray) -> str:
         # Words for what decides an element; empty where nothing more is known.
-        sweep = self.sweep
+        sweep = self._sweep_at(point)
         if quantity != "clearance" or sweep.kind.name != "workspace":
             return ""
         robot_file = robot_of(self.space.robot_at(point), sweep.spec, sweep.kind, self._path)
-        cell = {name: values[element[1:]] for name, values in self.cells.items()}
+        cell = {name: values[element[1:]] for name, values in self.cells_at(point).items()}
         return nearest_words(WorkspaceMap(robot_file, sweep.spec, self._path), cell)
 
     def many(self, points: Sequence[Point]) -> list[Columns | None]:
@@ -135,9 +165,16 @@ class MapMeasure(Measure):
 
     @cached_property
     def cells(self) -> dict[str, np.ndarray]:
-        """Coordinates of all cells."""
-        shape = tuple(len(points) for points in self.sweep.grid.axes.values())
-        return self.sweep.grid.cells(tuple(slice(0, count) for count in shape))
+        """Coordinates of all cells at the values of the file."""
+        return _cells_of(self.sweep)
+
+    def cells_at(self, point: Point) -> dict[str, np.ndarray]:
+        """Coordinates of all cells at a point."""
+        return _cells_of(self._sweep_at(point)) if self._moves else self.cells
+
+
+def _cells_of(sweep: Sweep) -> dict[str, np.ndarray]:
+    return sweep.grid.cells(tuple(slice(0, len(points)) for points in sweep.grid.axes.values()))
 
 
 def nearest_words(workspace: WorkspaceMap, cell: dict[str, np.ndarray]) -> str:
@@ -154,11 +191,13 @@ def nearest_words(workspace: WorkspaceMap, cell: dict[str, np.ndarray]) -> str:
 def _with_corners(spec: SweepFile) -> dict[str, Any]:
     # Axes with the ends of the full cells, which reach half-way to the farther neighbour of a point.
     axes = spec.axes.model_dump(exclude_none=True)
-    for name in "xyz":
-        points = np.sort(axis_points(spec.axes.named(name))) if name in axes else np.zeros(0)
+    for name in filter(axes.__contains__, "xyz"):
+        points = np.sort(axis_points(spec.axes.named(name)))
         half = 0.5 * cell_widths(points)
-        axes[name] = np.unique(np.concatenate([points - half, points, points + half])).tolist()
-    return {name: points for name, points in axes.items() if points}
+        ends = np.sort(np.concatenate([points - half, points, points + half]))
+        is_new = np.diff(ends, prepend=-np.inf) > SAME * np.ptp(ends)
+        axes[name] = ends[is_new].tolist()
+    return axes
 
 
 def with_verdicts(columns: Columns) -> Columns:

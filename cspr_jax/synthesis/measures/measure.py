@@ -8,11 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from cspr_jax.errors import InputError
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
 
 # Step of differences, as a fraction of the range of a parameter.
 STEP = 1e-6
+# Fraction of a number by which a step changes it only where it jumps.
+JUMP = 1e-4
 # Number of points whose columns are kept.
 KEPT = 256
 # Facet of an element that is its cell's value, whichever of its facets that is.
@@ -47,6 +50,14 @@ class Measure(abc.ABC):
     @abc.abstractmethod
     def check(self, quantity: str) -> None:
         """Refuse a quantity that the measure does not have, by an InputError of the key "quantity"."""
+
+    def check_at(self, point: Point) -> None:
+        """Refuse a point at which the file's own parameters leave no valid keys, by a ConfigError."""
+        del point
+
+    def check_proofs(self) -> None:
+        """Refuse to prove full cells of what has none, by an InputError of the key "prove"."""
+        raise InputError("prove", True, "absent: it is no map of a workspace")
 
     @abc.abstractmethod
     def slacks(self) -> tuple[str, ...]:
@@ -93,9 +104,18 @@ class Measure(abc.ABC):
         values = self.columns(point)[quantity][cells].astype(float)
         fractions = self.space.fractions(point)
         derivatives = np.zeros((len(cells), len(fractions)))
-        for i, fraction in enumerate(fractions):
-            step = STEP if fraction < 0.5 else -STEP
+
+        def changes(i: int, step: float) -> np.ndarray:
             there = self.space.point(fractions + step * (np.arange(len(fractions)) == i), point.arrangement)
             with np.errstate(invalid="ignore"):  # margins without limits are infinite at both
-                derivatives[:, i] = (self.columns(there)[quantity][cells] - values) / step
+                return self.columns(there)[quantity][cells] - values
+
+        for i, fraction in enumerate(fractions):
+            step = STEP if fraction < 0.5 else -STEP
+            change = changes(i, step)
+            is_jump = np.abs(change) > JUMP * (np.abs(values) + 1e-300)
+            if is_jump.any() and STEP < fraction < 1.0 - STEP:
+                other = -changes(i, -step)  # where another motion is chosen on one side, the other side counts
+                change = np.where(is_jump & (np.abs(other) < np.abs(change)), other, change)
+            derivatives[:, i] = change / step
         return values, np.nan_to_num(derivatives, posinf=0.0, neginf=0.0)

@@ -45,10 +45,16 @@ class PlanMeasure(Measure):
         if quantity not in names:
             hint = did_you_mean(quantity, names)
             raise InputError("quantity", quantity, f"{hint}one of {', '.join(names)}")
+        if quantity == "arcs" and not checked_plan(self._spec(self.space.first), self._path).takes_amplitude:
+            raise InputError("quantity", quantity, "another one: motions of its families have no arcs")
         if quantity.startswith("motor_") and not self._has_winch:
             raise InputError("quantity", quantity, "another one: the robot has no [winch]")
         if quantity == "natural_frequency_min" and not self._is_elastic:
             raise InputError("quantity", quantity, "another one: the robot has no axial_stiffness")
+
+    def check_at(self, point: Point) -> None:
+        """Refuse keys that parameters of the design have moved so that they are none; see `Measure.check_at`."""
+        checked_plan(self._spec(point), self._path)
 
     def slacks(self) -> tuple[str, ...]:
         """Margins of tensions and of limits; see `Measure.slacks`."""

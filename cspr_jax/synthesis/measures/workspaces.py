@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import RobotsApartError
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.shapes import Float, Int
@@ -52,8 +53,11 @@ class WorkspaceMeasure(MapMeasure):
                 axes[PARAMETER + variable.name] = np.linspace(variable.lower, variable.upper, 3)
         if len(space.arrangements) > 1 or space.arrangements[0]:
             axes[ARRANGEMENT] = self._numbers
-        with double_precision():
-            self._lanes = WorkspacesOfRobots(robot, sweep.spec, sweep.file, axes, screens=True)
+        try:
+            with double_precision():
+                self._lanes = WorkspacesOfRobots(robot, sweep.spec, sweep.file, axes, screens=True)
+        except ConfigError as error:  # some values give no robot
+            raise RobotsApartError from error
         self._axes = [name for name in axes if name not in sweep.grid.axes]
         self._margin = next(name for name in self.slacks() if name in _OF_CABLES)
 
