@@ -12,7 +12,7 @@ from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.maps.grid_map import RobotsApartError
 from cspr_jax.synthesis.evaluations import Evaluator
 from cspr_jax.synthesis.measures.frames import FrameMeasure, HallMeasure, ParametersMeasure, RobotMeasure
-from cspr_jax.synthesis.measures.groups import GroupedSpace, GroupMeasure, Part, grouped
+from cspr_jax.synthesis.measures.groups import GroupedSpace, GroupMeasure, TaskPart, grouped
 from cspr_jax.synthesis.measures.maps import MapMeasure
 from cspr_jax.synthesis.measures.measure import Measure
 from cspr_jax.synthesis.measures.plans import PlanMeasure
@@ -23,7 +23,7 @@ from cspr_jax.synthesis.space import RobotSpace, space_of
 Groups = Sequence[Sequence[str]]
 
 
-class Problem:
+class DesignProblem:
     """A checked design file, with the measures of its robots.
 
     Fields:
@@ -144,9 +144,11 @@ class Problem:
         if names[0] in (*self.design.maps, *self.design.plans):
             tasks = [name for name in names if name in group_of]
             words = tasks if table.of == TASKS else [""] * len(tasks)
-            parts = [Part(w, self._measures[t, proves], group_of[t]) for w, t in zip(words, tasks, strict=True)]
+            parts = [TaskPart(w, self._measures[t, proves], group_of[t]) for w, t in zip(words, tasks, strict=True)]
             return GroupMeasure(space, parts) if parts else None
-        return GroupMeasure(space, [Part("", self._measures[table.of, proves], k) for k in range(len(space.groups))])
+        return GroupMeasure(
+            space, [TaskPart("", self._measures[table.of, proves], k) for k in range(len(space.groups))]
+        )
 
     def _with(self, space: RobotSpace, measure_of: Callable[[QuantityKeys], Measure | None]) -> Evaluator:
         questions = list[Question]()

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 from cspr_jax.synthesis.evaluations import FIRST, Evaluator
 from cspr_jax.synthesis.measures.groups import GroupedSpace
-from cspr_jax.synthesis.problem import Groups, Problem
+from cspr_jax.synthesis.problem import DesignProblem, Groups
 from cspr_jax.synthesis.search import Chosen, Progress, searched
 
 
@@ -32,7 +32,7 @@ class Division:
 
 
 def reconfigured(
-    problem: Problem, progress: Progress, prepare: Callable[[Evaluator, str], None]
+    problem: DesignProblem, progress: Progress, prepare: Callable[[Evaluator, str], None]
 ) -> tuple[Division, list[Division]]:
     """The division with the fewest groups, and the best one of these; and each task alone.
 

@@ -13,7 +13,7 @@ from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.synthesis.evaluations import Evaluator
 from cspr_jax.synthesis.measures.groups import GroupedSpace
-from cspr_jax.synthesis.problem import Problem
+from cspr_jax.synthesis.problem import DesignProblem
 from cspr_jax.synthesis.reconfiguration import Division, reconfigured
 from cspr_jax.synthesis.record import opened
 from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting, parameters_at
@@ -36,7 +36,7 @@ def run_design(
 ) -> DesignSearch:
     """Search, from what an earlier process left in the directory on, and write what was found there."""
     with double_precision():
-        problem = Problem(design, content, file)
+        problem = DesignProblem(design, content, file)
         with opened(directory, identity_of(content, problem), file) as record:
 
             def prepare(evaluator: Evaluator, groups: str = "") -> None:
@@ -49,14 +49,14 @@ def run_design(
     return result
 
 
-def identity_of(content: Mapping[str, Any], problem: Problem) -> str:
+def identity_of(content: Mapping[str, Any], problem: DesignProblem) -> str:
     """Hash of all that determines what a design finds."""
     robot = problem.space.robot_file.full.model_dump(mode="json", exclude_none=True)
     plain = {key: value for key, value in content.items() if key not in ("robot", "files")}
     return digest({"method": METHOD, "version": __version__, "robot": robot, "design": plain})
 
 
-def _searched(problem: Problem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
+def _searched(problem: DesignProblem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
     if problem.design.reconfigure is not None:
         return _reconfigured(problem, progress, prepare)
     evaluator = problem.evaluator()
@@ -67,7 +67,7 @@ def _searched(problem: Problem, progress: Progress, prepare: Callable[..., None]
     return DesignSearch(problem.file, problem.design, evaluator, robots, not progress.stopped())
 
 
-def _reconfigured(problem: Problem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
+def _reconfigured(problem: DesignProblem, progress: Progress, prepare: Callable[..., None]) -> DesignSearch:
     best, alone = reconfigured(problem, progress, prepare)
     robots = (designed(best.evaluator, best.chosen, "best"),)
     settings = _settings(best, [f"setting_{k + 1}" for k in range(len(best.space.groups))])

@@ -6,7 +6,7 @@ import pytest
 
 from cspr_jax.config.design import checked_design
 from cspr_jax.numerics.elementary import double_precision
-from cspr_jax.synthesis.problem import Problem
+from cspr_jax.synthesis.problem import DesignProblem
 
 
 @pytest.fixture(scope="session")
@@ -16,6 +16,6 @@ def evaluator():
     def make(data):
         with double_precision():
             design, content = checked_design(data, Path("design.toml"))
-            return Problem(design, content, Path("design.toml")).evaluator()
+            return DesignProblem(design, content, Path("design.toml")).evaluator()
 
     return make

@@ -9,7 +9,21 @@ from cspr_jax.config.design import SearchKeys
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.synthesis.evaluations import FIRST
 from cspr_jax.synthesis.search import Progress, searched
-from tests.synthesis.problems import CIRCLE, FEASIBLE, PLANAR, PROBLEMS, RECTANGLE, TRIANGLE, design, objective
+from tests.synthesis.problems import (
+    BOX,
+    CIRCLE,
+    FEASIBLE,
+    PLANAR,
+    PROBLEMS,
+    RECTANGLE,
+    THREE,
+    TRIANGLE,
+    VOLUME,
+    design,
+    objective,
+    placed,
+    workspace,
+)
 
 # Largest relative errors of optima.
 CLOSE = 1e-6
@@ -82,6 +96,35 @@ def test_proved_widths_hold_everywhere(tmp_path):
     # What is kept in reserve for the proof costs less than a hundredth of the width.
     smallest = brentq(planar_margin, 1.65, 1.9)
     assert smallest < width < 1.01 * smallest
+
+
+def cells_of(axes):
+    """Centers and half widths of full cells."""
+    points = [np.linspace(one["start"], one["stop"], one["count"]) for one in axes.values()]
+    halves = [0.5 * (one[1] - one[0]) for one in points]
+    return np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3), np.array(halves)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("goal", [VOLUME, objective("parameters", "width", "smallest")], ids=["volume", "width"])
+def test_proved_requirements_hold_at_random_poses_of_each_cell(tmp_path, goal):
+    """A thousand places a cell, by solving the balance of three cables."""
+    places = workspace(BOX, {"tension_min": 2, "tension_max": 90})
+    data = placed(
+        THREE, goal, places, FEASIBLE | {"prove": True}, {"of": "frame", "quantity": "extent_z", "lower": 0.1}
+    )
+    result = cspr_jax.design(data, tmp_path / "out")
+    centers, halves = cells_of(BOX)
+    assert result.feasible and result.best.proofs[0].proved == len(centers)
+    spools = np.asarray(cspr_jax.load_robot(tmp_path / "out" / "best.toml").base_points)
+    random = np.random.default_rng(0)
+    for center in centers:
+        points = center + halves * random.uniform(-1.0, 1.0, (1000, 3))
+        arms = spools - points[:, None]
+        directions = arms / np.linalg.norm(arms, axis=2, keepdims=True)
+        weight = np.tile([0.0, 0.0, -5.0 * 9.81], (1000, 1))
+        tensions = np.linalg.solve(np.swapaxes(directions, 1, 2), weight[..., None])[..., 0]
+        assert tensions.min() >= 2.0 and tensions.max() <= 90.0
 
 
 def evolved(evaluator, seed=1):

@@ -52,7 +52,7 @@ def grouped(base: RobotSpace, changing: Sequence[str], groups: Sequence[Sequence
     return GroupedSpace(**fields | {"variables": tuple(variables)}, base=base, groups=names, columns=tuple(columns))
 
 
-class Part(NamedTuple):
+class TaskPart(NamedTuple):
     """A measure of one group.
 
     Fields:
@@ -69,7 +69,7 @@ class Part(NamedTuple):
 class GroupMeasure(Measure):
     """Columns of measures of several groups, one after the other."""
 
-    def __init__(self, space: GroupedSpace, parts: Sequence[Part]) -> None:
+    def __init__(self, space: GroupedSpace, parts: Sequence[TaskPart]) -> None:
         """Take the measures."""
         super().__init__(space)
         self._grouped, self._parts = space, tuple(parts)
