@@ -161,7 +161,7 @@ def values_words(setting: Setting) -> str:
 
 def number(value: float) -> str:
     """A number with as many digits as tables show."""
-    return f"{value:.{DIGITS}g}"
+    return f"{value + 0.0:.{DIGITS}g}"
 
 
 def design_table(search: DesignSearch) -> Any:

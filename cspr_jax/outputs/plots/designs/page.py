@@ -37,6 +37,8 @@ def design_page(search: DesignSearch, picture: str) -> str:
         "<p>Change of each number with a unit of each parameter; of feasible, that of its smallest margin.</p>",
         _table(*_derivatives(search)),
     ]
+    if search.settings:
+        parts += ["<h2>Settings for tasks</h2>", _table(*_settings(search))]
     if any(robot.sensitivities.holdings for robot in search.robots):
         parts += ["<h2>What holds the parameters</h2>", _table(*_holdings(search))]
     body = "\n".join(parts)
@@ -80,6 +82,16 @@ def _derivatives(search: DesignSearch) -> tuple[list[str], list[list[str]]]:
     rows = [
         [_with_unit(question.name, unit_of(search, question)), *("jumps" if math.isnan(x) else number(x) for x in row)]
         for question, row in zip(search.questions, derivatives.tolist(), strict=True)
+    ]
+    return heads, rows
+
+
+def _settings(search: DesignSearch) -> tuple[list[str], list[list[str]]]:
+    goal = search.questions[0]
+    heads = ["setting", "tasks", *search.settings[0].parameters, _with_unit(goal.name, unit_of(search, goal))]
+    rows = [
+        [one.name, " and ".join(one.tasks), *map(number, one.parameters.values()), number(one.value)]
+        for one in (*search.settings, *search.alone)
     ]
     return heads, rows
 
