@@ -9,7 +9,7 @@ from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from pydantic import ModelWrapValidatorHandler
+from pydantic.functional_validators import ModelWrapValidatorHandler
 
 from cspr_jax.config.keys.parameter import ParameterTable
 from cspr_jax.config.reading import Model, checked

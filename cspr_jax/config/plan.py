@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, ModelWrapValidatorHandler, PrivateAttr, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic.functional_validators import ModelWrapValidatorHandler
 
 from cspr_jax.config.keys.ellipse import ELLIPSE_KEYS, EllipseTable
 from cspr_jax.config.keys.free_motions import FreeMotionKeys

@@ -9,13 +9,13 @@ import numpy as np
 from pydantic import (
     Discriminator,
     Field,
-    ModelWrapValidatorHandler,
     SerializerFunctionWrapHandler,
     Tag,
     field_validator,
     model_serializer,
     model_validator,
 )
+from pydantic.functional_validators import ModelWrapValidatorHandler
 
 from cspr_jax.config.keys.ellipse import SweepEllipse
 from cspr_jax.config.keys.launch import LaunchSearch

@@ -20,7 +20,7 @@ from cspr_jax.synthesis.space import Point, UnsuitableRobotError
 
 # Widths of steps in turn, as fractions of the spread of the margins.
 WIDTHS = (0.3, 0.1, 0.03, 0.01)
-MAX_ITERATIONS = 30
+MAX_ITERATIONS = 12
 
 
 def counted(evaluator: Evaluator, start: Point, goal: Goal, stopped: Callable[[], bool] = lambda: False) -> Evaluation:

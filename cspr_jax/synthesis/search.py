@@ -26,6 +26,8 @@ RESERVES = (1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
 HALVINGS = 3
 # Local searches end where so many have found the same number, up to this fraction of it.
 AGREEING, AGREED = 2, 1e-6
+# By how much fewer generations differential evolution has after a local search.
+FEWER = 4
 # Robots of a front that are nearer to each other than this fraction of its extent count as one.
 NEAR = 1e-4
 
@@ -91,7 +93,9 @@ def _best(evaluator: Evaluator, settings: SearchKeys, goal: Goal, progress: Prog
         progress.tell(f"local search {i + 1} of {len(starts)}{_words(evaluator, best)}")
     results.sort(key=lambda one: goal.rank(evaluator, one))
     if evaluator.space.names and not progress.stopped() and not all(question.is_smooth for question in questions):
-        results.insert(0, evolved(evaluator, results, goal, settings.generations, progress.stopped))
+        # After a local search it only looks about.
+        generations = settings.generations if climb is None else max(settings.generations // FEWER, 1)
+        results.insert(0, evolved(evaluator, results, goal, generations, progress.stopped))
         progress.tell(f"differential evolution{_words(evaluator, results[0])}")
     return evaluator.one(min(results, key=lambda one: goal.rank(evaluator, one)).point)
 
