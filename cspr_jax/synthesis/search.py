@@ -157,7 +157,9 @@ def _worths(evaluator: Evaluator, robots: Sequence[Evaluation]) -> Float[np.ndar
 
 def _spread(evaluator: Evaluator, results: list[Evaluation], count: int) -> list[Evaluation]:
     # Results that no robot surpasses in both objectives; where numbers jump, then others of that kind, far from these.
-    good = [one for one in evaluator.record.values() if one.missed == 0.0]
+    # Results come first, so that among equals they stay.
+    all_robots = {one.point: one for one in (*results, *evaluator.record.values())}
+    good = [one for one in all_robots.values() if one.missed == 0.0]
     if not good:
         return []
     front = list(itertools.compress(good, front_of(_worths(evaluator, good))))

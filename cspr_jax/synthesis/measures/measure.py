@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.shapes import Float, Int
-from cspr_jax.synthesis.space import Point, RobotSpace, UnsuitableRobotError
+from cspr_jax.synthesis.space import AT_BOUND, Point, RobotSpace, UnsuitableRobotError
 
 # Step of differences, as a fraction of the range of a parameter.
 STEP = 1e-6
@@ -113,9 +113,10 @@ class Measure(abc.ABC):
         for i, fraction in enumerate(fractions):
             step = STEP if fraction < 0.5 else -STEP
             change = changes(i, step)
-            is_jump = np.abs(change) > JUMP * (np.abs(values) + 1e-300)
-            if is_jump.any() and STEP < fraction < 1.0 - STEP:
-                other = -changes(i, -step)  # where another motion is chosen on one side, the other side counts
-                change = np.where(is_jump & (np.abs(other) < np.abs(change)), other, change)
             derivatives[:, i] = change / step
+            is_jump = np.abs(change) > JUMP * (np.abs(values) + 1e-300)
+            back = -np.sign(step) * min(STEP, fraction if step > 0.0 else 1.0 - fraction)
+            if is_jump.any() and abs(back) > AT_BOUND:
+                other = changes(i, back)  # where another motion is chosen on one side, the other side counts
+                derivatives[:, i] = np.where(is_jump & (np.abs(other) < np.abs(change)), other / back, change / step)
         return values, np.nan_to_num(derivatives, posinf=0.0, neginf=0.0)
