@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cspr_jax.config.design import SearchKeys
+from cspr_jax.errors import ConfigError
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.synthesis.counting import counted
 from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal, front_of
@@ -66,9 +67,17 @@ class Chosen:
 
 
 def searched(evaluator: Evaluator, settings: SearchKeys, progress: Progress) -> list[Chosen]:
-    """The best robot; of two objectives those of the Pareto front, from the best by the first objective on."""
+    """The best robot; of two objectives those of the Pareto front, from the best by the first objective on.
+
+    Raises:
+        ConfigError: no robot has an answer to all questions.
+    """
     screened(evaluator, settings.screen, progress.stopped)
     progress.tell(f"screened {len(evaluator.record)} robots{_best_words(evaluator)}")
+    if all(math.isinf(one.missed) for one in evaluator.record.values()) and not progress.stopped():
+        problem = evaluator.one(evaluator.space.first).problem
+        words = "no robot has an answer to all questions; that of the file has none since"
+        raise ConfigError(evaluator.space.file, f"{words} {problem}")
     best = _best(evaluator, settings, FIRST, progress)
     if len(evaluator.objectives) == 1:
         return [_proved(evaluator, settings, FIRST, best, progress)]

@@ -90,6 +90,13 @@ def test_cells_about_an_axis_have_no_proofs(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_plans_that_no_robot_has(tmp_path):
+    lift = LIFT | {"limits": {"uncertainty": {"spool_positions": 0.001}}}
+    changes = {"objective.0": {"of": "lift", "quantity": "tolerated", "goal": "largest"}, "plans.lift": lift}
+    with pytest.raises(ConfigError, match=r"no robot has an answer .* plans.lift: uncertainty"):
+        cspr_jax.design(changed(PROBLEMS["least power"], changes | {"search": {"screen": 4}}), tmp_path / "out")
+
+
 def test_parameters_that_give_no_robot():
     bad = parameter("mass", 2.0, -1.0, 3.0, {"mass": 1.0})
     with pytest.raises(ConfigError, match=r"parameter\[1\].lower = -1.0: must be a value that gives a robot"):
