@@ -57,7 +57,9 @@ IMAGES = {
         command="design",
     ),
     "design_orientations": Image(
-        "Attained orientations over the size of the triangle of six spools, and the best spools.", 120, command="design"
+        "Attained orientations over the distance of the two spools of each pair, and the best spools.",
+        120,
+        command="design",
     ),
     "design_rails": Image(
         "Positions of two spools on a rail for three shelves, with one change.", 20, command="design"

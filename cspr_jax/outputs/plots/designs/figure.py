@@ -56,8 +56,7 @@ def _front(panel: Axes, search: DesignSearch) -> None:
     values = np.array([one.values[:2] for one in search.evaluations])
     met = np.array([one.missed == 0.0 for one in search.evaluations])
     chosen = np.array([robot.values[:2] for robot in search.robots])
-    panel.plot(*values[~met].T, ".", color=FAINT, markersize=3, label="requirements missed")
-    panel.plot(*values[met].T, ".", color=GREY, markersize=4, label="requirements met")
+    _dots(panel, values[:, 0], values[:, 1], met)
     panel.plot(*chosen.T, "o-", color=COLOURS[1], markersize=5, linewidth=1.0, label="Pareto front")
     for robot, (x, y) in zip(search.robots, chosen, strict=True):
         panel.annotate(robot.name.removeprefix("front_"), (x, y), textcoords="offset points", xytext=(5, 5))
@@ -66,6 +65,13 @@ def _front(panel: Axes, search: DesignSearch) -> None:
         _zoom(axis, np.append(values[met, column], chosen[:, column]))
     panel.grid(alpha=0.25)
     panel.legend(loc="best", fontsize="small")
+
+
+def _dots(panel: Axes, across: np.ndarray, up: np.ndarray, met: np.ndarray) -> None:
+    # Robots that miss requirements, if there are some, behind those that meet them.
+    for mask, colour, label in ((~met, FAINT, "requirements missed"), (met, GREY, "requirements met")):
+        if mask.any():
+            panel.plot(across[mask], up[mask], ".", color=colour, markersize=4, label=label)
 
 
 def _zoom(set_limits: Any, values: np.ndarray) -> None:
@@ -87,8 +93,7 @@ def _against_parameter(panel: Axes, search: DesignSearch) -> None:
         at, best = search.values_of(name), search.best.parameters[name]
         unit = next(one.unit for one in search.evaluator.space.variables if one.name == name)
         panel.set_xlabel(name + ("" if unit == "1" else f" ({unit})"))
-    panel.plot(at[~met], values[~met], ".", color=FAINT, markersize=3, label="requirements missed")
-    panel.plot(at[met], values[met], ".", color=GREY, markersize=4, label="requirements met")
+    _dots(panel, at, values, met)
     panel.plot([best], [search.best.values[0]], "o", color=COLOURS[1], markersize=7, label="best")
     panel.set_ylabel(_words(search, 0))
     _zoom(panel.set_ylim, np.append(values[met], search.best.values[0]))
