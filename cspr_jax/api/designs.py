@@ -11,7 +11,6 @@ from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.files.pictured import Pictured
 from cspr_jax.config.design import checked_design
 from cspr_jax.config.reading import plain_values, read_toml
-from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors.arguments import File
 from cspr_jax.outputs.designs.files import designed_text, write_design
 from cspr_jax.outputs.designs.report import design_lines, design_object, design_table
@@ -88,10 +87,6 @@ class Design(Pictured):
     def to_toml(self, index: int = 0) -> str:
         """A robot as the text of a robot file."""
         return designed_text(self._search, self.robots[index])
-
-    def robot_at(self, **parameters: float) -> RobotFile:
-        """The robot file's robot at other values of its parameters."""
-        return self._search.evaluator.space.robot_file.full.with_parameters(parameters)
 
     def _figure(self) -> Figure:
         from cspr_jax.outputs.plots.designs.figure import design_figure  # loads matplotlib

@@ -26,6 +26,9 @@ SMALLEST_OF_DIFFERENCES = 1e-3
 MAX_ROUNDS, MAX_ITERATIONS, MAX_FAILURES = 25, 25, 3
 # Relative improvement below which a search ends, and precision of the level that SLSQP seeks.
 CONVERGED, PRECISION = 1e-9, 1e-11
+# The same where derivatives are differences, which are no more accurate, of numbers with kinks that are not told apart.
+CONVERGED_BY_DIFFERENCES, PRECISION_OF_DIFFERENCES = 1e-6, 1e-7
+ROUNDS_OF_DIFFERENCES, ITERATIONS_OF_DIFFERENCES = 10, 6
 # Reserves above requirements, in units of the ranges of the parameters, in turn, while the solution only
 # touches them and its verdict is no more than undecided.
 RESERVES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
@@ -56,8 +59,10 @@ def improved(
     except UnsuitableRobotError:
         return evaluator.one(start)
     best, half, failures, reserves = evaluator.one(start), BOX, 0, list(RESERVES)
-    smallest = SMALLEST_BOX if all(measure.is_exact for measure in evaluator.measures) else SMALLEST_OF_DIFFERENCES
-    for _ in range(MAX_ROUNDS):
+    is_exact = all(measure.is_exact for measure in evaluator.measures)
+    smallest = SMALLEST_BOX if is_exact else SMALLEST_OF_DIFFERENCES
+    converged = CONVERGED if is_exact else CONVERGED_BY_DIFFERENCES
+    for _ in range(MAX_ROUNDS if is_exact else ROUNDS_OF_DIFFERENCES):
         if stopped() or half < smallest or failures > MAX_FAILURES:
             break
         there = _solved(evaluator, constraints, best.point, half, reserves[0])
@@ -78,7 +83,7 @@ def improved(
         gain = before[1] - after[1] if before[0] == after[0] else math.inf
         moved = np.abs(evaluator.space.fractions(there) - evaluator.space.fractions(best.point)).max()
         best = evaluation
-        if not joined and not gain > CONVERGED * max(abs(after[1]), 1e-300):
+        if not joined and not gain > converged * max(abs(after[1]), 1e-300):
             break
         half = min(max(2.0 * moved, 0.25 * half), BOX)
     return best
@@ -120,6 +125,9 @@ def _solved(
     from scipy.optimize import minimize  # loads much of SciPy
 
     space, arrangement = evaluator.space, start.arrangement
+    is_exact = all(measure.is_exact for measure in evaluator.measures)
+    precision = PRECISION if is_exact else PRECISION_OF_DIFFERENCES
+    iterations = MAX_ITERATIONS if is_exact else ITERATIONS_OF_DIFFERENCES
     at_start = space.fractions(start)
     values = _Values(evaluator, constraints, arrangement, reserve)
     try:
@@ -133,7 +141,7 @@ def _solved(
             bounds=bounds,
             method="SLSQP",
             constraints={"type": "ineq", "fun": lambda x: values(x)[0], "jac": lambda x: values(x)[1]},
-            options={"maxiter": MAX_ITERATIONS, "ftol": PRECISION},
+            options={"maxiter": iterations, "ftol": precision},
         )
     except UnsuitableRobotError:
         return None

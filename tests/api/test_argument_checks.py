@@ -76,6 +76,7 @@ TEXTS = {
 }
 TEXTS |= {"pattern", "precision", "quantity", "rule", "scheduler", "size", "what", "z_axis"}
 PATHS = {"log", "plan", "directory", "folder", "given", "kernels", "output", "path", "reference", "result", "results"}
+PATHS |= {"source"}
 # Whole numbers, which are bounded: what would take all memory.
 WHOLE = {"divisions", "max_arcs", "population", "samples", "trajectories", "workers"}
 
@@ -119,7 +120,7 @@ def good():
     values |= dict.fromkeys(("spool_radius", "platform_radius", "drum_radius", "pulses", "cable_error"), 1.0)
     values |= {"base_points": robot.base_points, "platform_points": robot.base_points, "inertia": np.eye(3)}
     values |= dict.fromkeys(
-        ("given", "log", "path", "output", "results", "result", "directory", "names", "reference"), "a"
+        ("given", "source", "log", "path", "output", "results", "result", "directory", "names", "reference"), "a"
     )
     values |= {"times": [0.0, 1.0], "paths": [[[0.4, 0.1, 1.5], [0.3, 0.1, 1.5]]]}
     places = [{"position": [0.1, 0.0, 1.5]}, {"position": [0.1, 0.1, 1.5]}]

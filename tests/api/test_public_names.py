@@ -16,7 +16,7 @@ from support.folder import PLAN, SWEEP, folder
 
 import cspr_jax
 from cspr_jax import cli
-from cspr_jax.api import calibration, plans, sizing
+from cspr_jax.api import calibration, designs, plans, sizing
 from cspr_jax.api.files.logs import LogComparison
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
@@ -31,6 +31,7 @@ FUNCTIONS = {
     "status": ("status",),
     "verify": ("verify",),
     "volume": ("workspace_volume",),
+    "design": ("design",),
     "plan": ("plan",),
     "check": ("check",),
     "calibrate": ("calibrate",),
@@ -74,6 +75,7 @@ def test_every_command_has_its_function():
         functions += [cspr_jax.Simulation.plot] if name == "simulate" else []
         functions += [cspr_jax.Stops.plot] if name == "stops" else []
         functions += [sizing.Sizes.plot] if name == "size" else []
+        functions += [designs.Design.plot] if name == "design" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         functions += [calibration.Calibration.save] if name == "calibrate" else []
         functions += [LogComparison.page] if name == "log" else []
@@ -91,6 +93,7 @@ def test_every_command_has_its_function():
         own |= {"names": "names"} if name == "robots" else {}
         own |= {"robot": "reference"} if name == "anchors" else {}
         own |= {"sources": "given"} if name == "size" else {}
+        own |= {"design": "source", "output": "directory", "picture": "output"} if name == "design" else {}
         known |= {"elastic"} if name == "replay" else set()  # a function of its own
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}

@@ -324,7 +324,7 @@ def test_wrench_closure():
     ("old", "new", "words"),
     [
         ("[axes]", '[trajectory]\nfamily = "transition"\n[axes]', "trajectory.family: must be absent"),
-        ("mass = 10", "mass = 10\nplanar = true", "base_points"),
+        ("mass = 10", "mass = 10\nplanar = true", "axes.y: must be [0] for a planar robot"),
         ("z = [3, 25, 31]", "z = [3, 25, 31]\nz0 = [1]", "axes.z0: must be absent"),
         ("map = ", "rob = 1\nmap = ", "rob"),
     ],
