@@ -46,7 +46,7 @@ def test_robots_as_lanes_are_those_one_by_one(evaluator, name):
 
 
 def check_derivatives(measure, quantity, points):
-    space, compared = measure.space, 0
+    space, compared, close = measure.space, 0, 0
     with double_precision():
         for point in points:
             cells = np.arange(len(measure.columns(point)[quantity]))
@@ -55,15 +55,15 @@ def check_derivatives(measure, quantity, points):
             differences = np.zeros_like(derivatives)
             for i in range(len(space.names)):
                 shift = STEP * (np.arange(len(space.names)) == i)
-                ends = [space.point(space.fractions(point) + s * shift, 0) for s in (1.0, -1.0)]
-                above, below = (measure.columns(end)[quantity] for end in ends)
-                differences[:, i] = (above - below) / (2.0 * STEP)
+                ends = [space.point(space.fractions(point) + s * shift, 0) for s in (1.0, -1.0, 2.0, -2.0)]
+                above, below, far_above, far_below = (measure.columns(end)[quantity] for end in ends)
+                # Extrapolated to a step of zero, since margins near singular poses are strongly curved.
+                differences[:, i] = (8.0 * (above - below) - (far_above - far_below)) / (12.0 * STEP)
             errors = np.abs(differences - derivatives).max(1)
-            # Few cells have a kink within the step.
             is_close = errors <= 1e-6 * np.abs(derivatives).max()
-            assert np.mean(is_close) > 0.9
-            compared += int(is_close.sum())
-    assert compared > 5
+            compared, close = compared + len(is_close), close + int(is_close.sum())
+    # Few cells have a kink within the step, and few robots are so near a singular one that the step is too long.
+    assert compared > 5 and close > 0.95 * compared, (close, compared)
 
 
 @pytest.mark.parametrize("name", NAMES)
