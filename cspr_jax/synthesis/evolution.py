@@ -29,9 +29,10 @@ def evolved(
 
     space, arrangement = evaluator.space, starts[0].point.arrangement
     count = len(space.names)
-    rank = lambda evaluation: goal.rank(evaluator, evaluation)  # noqa: E731
-    if count == 0:
-        return min(starts, key=rank)
+
+    def rank(evaluation: Evaluation) -> tuple[float, float, float]:
+        return goal.rank(evaluator, evaluation)
+
     population_size = max(MEMBERS * count, FEWEST)
     members = [space.fractions(start.point) for start in starts if start.point.arrangement == arrangement][
         :population_size

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,16 +20,24 @@ from cspr_jax.synthesis.evaluations import FIRST, Evaluation, Evaluator, Goal
 from cspr_jax.synthesis.questions import Piece, pieces_of
 from cspr_jax.synthesis.space import Point, UnsuitableRobotError
 
-# Half of the edge of the box about the best robot so far, as a fraction of the ranges, at first and at last.
-BOX, SMALLEST_BOX = 0.3, 1e-7
-# The last box where derivatives are differences of slow functions, which jump where another motion is chosen.
-SMALLEST_OF_DIFFERENCES = 1e-3
-MAX_ROUNDS, MAX_ITERATIONS, MAX_FAILURES = 25, 25, 3
-# Relative improvement below which a search ends, and precision of the level that SLSQP seeks.
-CONVERGED, PRECISION = 1e-9, 1e-11
-# The same where derivatives are differences, which are no more accurate, of numbers with kinks that are not told apart.
-CONVERGED_BY_DIFFERENCES, PRECISION_OF_DIFFERENCES = 1e-6, 1e-7
-ROUNDS_OF_DIFFERENCES, ITERATIONS_OF_DIFFERENCES = 10, 6
+# Half of the edge of the box about the best robot so far, as a fraction of the ranges, at first.
+BOX = 0.3
+MAX_FAILURES = 3
+
+
+class _Effort(NamedTuple):
+    # Half of the edge of the last box, number of rounds and of iterations of SLSQP in each, relative improvement below
+    # which a search ends, and precision of the level that SLSQP seeks.
+    smallest_box: float
+    rounds: int
+    iterations: int
+    converged: float
+    precision: float
+
+
+_EXACT = _Effort(1e-7, 25, 25, 1e-9, 1e-11)
+# Differences are no more accurate, jump where another motion is chosen, and do not tell kinks apart.
+_BY_DIFFERENCES = _Effort(1e-3, 10, 6, 1e-6, 1e-7)
 # Reserves above requirements, in units of the ranges of the parameters, in turn, while the solution only
 # touches them and its verdict is no more than undecided.
 RESERVES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
@@ -59,13 +68,11 @@ def improved(
     except UnsuitableRobotError:
         return evaluator.one(start)
     best, half, failures, reserves = evaluator.one(start), BOX, 0, list(RESERVES)
-    is_exact = all(measure.is_exact for measure in evaluator.measures)
-    smallest = SMALLEST_BOX if is_exact else SMALLEST_OF_DIFFERENCES
-    converged = CONVERGED if is_exact else CONVERGED_BY_DIFFERENCES
-    for _ in range(MAX_ROUNDS if is_exact else ROUNDS_OF_DIFFERENCES):
-        if stopped() or half < smallest or failures > MAX_FAILURES:
+    effort = _EXACT if all(measure.is_exact for measure in evaluator.measures) else _BY_DIFFERENCES
+    for _ in range(effort.rounds):
+        if stopped() or half < effort.smallest_box or failures > MAX_FAILURES:
             break
-        there = _solved(evaluator, constraints, best.point, half, reserves[0])
+        there = _solved(evaluator, constraints, best.point, half, reserves[0], effort)
         if there is None or there == best.point:
             half, failures = 0.1 * half, failures + 1
             continue
@@ -83,7 +90,7 @@ def improved(
         gain = before[1] - after[1] if before[0] == after[0] else math.inf
         moved = np.abs(evaluator.space.fractions(there) - evaluator.space.fractions(best.point)).max()
         best = evaluation
-        if not joined and not gain > converged * max(abs(after[1]), 1e-300):
+        if not joined and not gain > effort.converged * max(abs(after[1]), 1e-300):
             break
         half = min(max(2.0 * moved, 0.25 * half), BOX)
     return best
@@ -119,15 +126,12 @@ def _constraints(evaluator: Evaluator, point: Point, goal: Goal) -> list[_Constr
 
 
 def _solved(
-    evaluator: Evaluator, constraints: list[_Constraint], start: Point, half: float, reserve: float
+    evaluator: Evaluator, constraints: list[_Constraint], start: Point, half: float, reserve: float, effort: _Effort
 ) -> Point | None:
     # The solution among the functions that take part, in a box about the start; None where it has no robot.
     from scipy.optimize import minimize  # loads much of SciPy
 
     space, arrangement = evaluator.space, start.arrangement
-    is_exact = all(measure.is_exact for measure in evaluator.measures)
-    precision = PRECISION if is_exact else PRECISION_OF_DIFFERENCES
-    iterations = MAX_ITERATIONS if is_exact else ITERATIONS_OF_DIFFERENCES
     at_start = space.fractions(start)
     values = _Values(evaluator, constraints, arrangement, reserve)
     try:
@@ -141,7 +145,7 @@ def _solved(
             bounds=bounds,
             method="SLSQP",
             constraints={"type": "ineq", "fun": lambda x: values(x)[0], "jac": lambda x: values(x)[1]},
-            options={"maxiter": iterations, "ftol": precision},
+            options={"maxiter": effort.iterations, "ftol": effort.precision},
         )
     except UnsuitableRobotError:
         return None

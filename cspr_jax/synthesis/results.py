@@ -14,7 +14,6 @@ from cspr_jax.synthesis.evaluations import Evaluation, Evaluator
 from cspr_jax.synthesis.proofs import RequirementProof
 from cspr_jax.synthesis.questions import Question
 from cspr_jax.synthesis.sensitivities import DesignSensitivities
-from cspr_jax.synthesis.space import Point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,8 +109,3 @@ class DesignSearch:
         """Values of a parameter in all evaluations."""
         i = self.evaluator.space.names.index(name)
         return np.array([one.point.values[i] for one in self.evaluations])
-
-
-def parameters_at(evaluator: Evaluator, point: Point) -> dict[str, float]:
-    """Values of the parameters at a point, by name."""
-    return dict(zip(evaluator.space.names, point.values, strict=True))

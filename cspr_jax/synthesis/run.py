@@ -12,11 +12,10 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.synthesis.evaluations import Evaluator
-from cspr_jax.synthesis.measures.groups import GroupedSpace
 from cspr_jax.synthesis.problem import DesignProblem
 from cspr_jax.synthesis.reconfiguration import Division, reconfigured
 from cspr_jax.synthesis.record import opened
-from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting, parameters_at
+from cspr_jax.synthesis.results import DesignedRobot, DesignSearch, Setting
 from cspr_jax.synthesis.search import Chosen, Progress, searched
 from cspr_jax.synthesis.sensitivities import sensitivities_of
 
@@ -88,7 +87,7 @@ def _settings(division: Division, names: list[str]) -> list[Setting]:
                 name,
                 tasks,
                 _named(robot_file, name),
-                dict(zip(space.base.names, point.values, strict=True)),
+                space.base.parameters(point),
                 evaluation.values[0],
             )
         )
@@ -104,13 +103,11 @@ def designed(evaluator: Evaluator, chosen: Chosen, name: str) -> DesignedRobot:
     """The robot of a point, with what holds it."""
     evaluation = chosen.evaluation
     careful = evaluator.with_requirements(chosen.requirements or evaluator.requirements)
-    space = evaluator.space
-    point = space.of_group(evaluation.point, 0) if isinstance(space, GroupedSpace) else evaluation.point
-    robot_file = (space.base if isinstance(space, GroupedSpace) else space).robot_at(point)
+    robot_file = evaluator.space.robot_at(evaluation.point)
     return DesignedRobot(
         name=name,
         robot_file=_named(robot_file, name),
-        parameters=parameters_at(evaluator, evaluation.point),
+        parameters=evaluator.space.parameters(evaluation.point),
         arrangement=evaluation.point.arrangement,
         values=evaluation.values,
         missed=evaluation.missed,

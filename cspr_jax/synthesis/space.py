@@ -86,6 +86,10 @@ class RobotSpace:
         of_file = {table.name for table in self.of_file}
         return [name for name in self.names if name not in of_file]
 
+    def parameters(self, point: Point) -> dict[str, float]:
+        """Values of the parameters at a point, by name."""
+        return dict(zip(self.names, point.values, strict=True))
+
     def point(self, fractions: Float[np.ndarray, "k"], arrangement: int) -> Point:
         """The point at fractions of the ranges of the parameters."""
         inside = np.clip(fractions, 0.0, 1.0)
@@ -103,7 +107,7 @@ class RobotSpace:
         Raises:
             UnsuitableRobotError: there is none.
         """
-        values = {name: value for name, value in zip(self.names, point.values, strict=True) if name in self.of_robot}
+        values = {name: value for name, value in self.parameters(point).items() if name in self.of_robot}
         if point.arrangement:
             values[ARRANGEMENT] = point.arrangement
         try:
@@ -119,7 +123,7 @@ class RobotSpace:
     def table_at(self, point: Point, table: str, name: str) -> dict[str, Any]:
         """Keys of a map or plan at a point."""
         of_file = {one.name for one in self.of_file}
-        values = {key: value for key, value in zip(self.names, point.values, strict=True) if key in of_file}
+        values = {key: value for key, value in self.parameters(point).items() if key in of_file}
         there = moved(self.of_file, self.tables, values) if values else None
         return dict((self.tables if there is None else there[0])[table][name])
 

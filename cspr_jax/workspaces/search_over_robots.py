@@ -264,9 +264,15 @@ class SearchOverRobots(WorkspaceSearch):
         limits = TensionLimits(low, jnp.where(jnp.isinf(high), very_large, high), measure)
 
         def along(row: Array) -> Array:
-            one: Any = CableSubsets(row[None], None)  # type: ignore[arg-type]
+            facet: Any = row[None]
             bounds = kernels.by_normals(
-                columns, loss, constants.wrenches, limits, one, measure=self._measure, is_bounded=True
+                columns,
+                loss,
+                constants.wrenches,
+                limits,
+                CableSubsets(facet, None),
+                measure=self._measure,
+                is_bounded=True,
             )
             lower, upper = jnp.real(bounds), jnp.imag(bounds)
             # Cables that depend on each other have no normal but rounding; other cables have all facets.

@@ -138,8 +138,10 @@ def test_at_kinks_a_derivative_is_between_both_sides(case):
     position, turn = case.pose(np.random.default_rng(0))[0], np.array([1.0, 0.0, 0.0, 0.0])
     body = (turn,) if PATTERNS[case.pattern].is_body else ()
     value = jax.jit(lambda at: cspr_jax.pose_margin(robot, at, *body))
-    if not np.isfinite(float(value(position))):
+    matrix = np.asarray(cspr_jax.pose_wrench_matrix(robot, position, *body))
+    if np.linalg.matrix_rank(matrix) < len(matrix):
         pytest.skip("the cables do not span all wrenches")
+    assert np.isfinite(float(value(position)))
     gradient = np.asarray(jax.grad(value)(position))
     of_robot = jax.grad(lambda one: cspr_jax.pose_margin(one, position, *body), allow_int=True)(robot)
     assert all(np.isfinite(x).all() for x in (gradient, *jax.tree.leaves(of_robot)))

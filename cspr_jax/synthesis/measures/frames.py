@@ -75,7 +75,7 @@ class ParametersMeasure(_OfRobot):
         self._refuse_others(quantity, self.space.names)
 
     def _columns(self, point: Point) -> Columns:
-        return {name: np.array([value]) for name, value in zip(self.space.names, point.values, strict=True)}
+        return {name: np.array([value]) for name, value in self.space.parameters(point).items()}
 
 
 class HallMeasure(_OfRobot):

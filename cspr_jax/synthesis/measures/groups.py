@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.config.keys.parameter import ParameterTable
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.numerics.shapes import Float, Int
 from cspr_jax.synthesis.measures.measure import Columns, Measure
 from cspr_jax.synthesis.space import Point, RobotSpace
@@ -27,6 +28,10 @@ class GroupedSpace(RobotSpace):
     base: RobotSpace
     groups: tuple[tuple[str, ...], ...]
     columns: tuple[tuple[int, ...], ...]
+
+    def robot_at(self, point: Point) -> RobotFile:
+        """The robot as it is set for the first group; see `RobotSpace.robot_at`."""
+        return self.base.robot_at(self.of_group(point, 0))
 
     def of_group(self, point: Point, group: int) -> Point:
         """The point of one group's robot."""
