@@ -11,7 +11,7 @@ from cspr_jax.config.design import checked_design
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.robots.model.shapes import point_distances
 from cspr_jax.synthesis.measures.workspaces import WorkspaceMeasure
-from tests.synthesis.problems import PLANAR, PROBLEMS, design, objective, workspace
+from tests.synthesis.problems import EIGHT, PLANAR, PROBLEMS, design, objective, workspace
 
 # Problems of robots with 2, 3, 4, 6 and 8 cables, of points and bodies; the slow ones are thorough.
 NAMES = [
@@ -70,6 +70,12 @@ def check_derivatives(measure, quantity, points):
 def test_derivatives_are_differences(evaluator, name):
     ours = evaluator(PROBLEMS[name])
     check_derivatives(ours.objectives[0].measure, "wrench_margin", points_of(ours, 2))
+
+
+def test_cables_that_depend_on_each_other(evaluator):
+    """Pairs of spools at one point: some cables have no normal but rounding, whose derivatives would be noise."""
+    ours = evaluator(PROBLEMS["eight margin"] | {"robot": EIGHT | {"parameter": EIGHT["parameter"][1:2]}})
+    check_derivatives(ours.objectives[0].measure, "wrench_margin", points_of(ours, 3))
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)

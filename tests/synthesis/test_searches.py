@@ -90,6 +90,19 @@ def test_fractions_as_requirements(tmp_path, bounds):
     assert result.feasible and bounds.get("lower", 0.0) <= result.best.values[1] <= bounds.get("upper", 1.0)
 
 
+def test_a_fraction_leaves_the_worst_cells_out(tmp_path):
+    """The smallest width with which 16 of 20 places are held, by tensions in closed form."""
+    requirement = {"of": "places", "quantity": "fraction", "lower": 0.8}
+    best = cspr_jax.design(design(PLANAR, WIDE, [requirement], maps={"places": RECTANGLE}), tmp_path / "out").best
+    x, z = np.meshgrid(np.linspace(-0.8, 0.8, 5), np.linspace(0.5, 1.5, 4))
+    for half in np.linspace(0.5, 1.0, 50_001):
+        weight = 2.0 * 9.81 / (2.0 * half * z)
+        tensions = weight * (half - x) * np.hypot(x + half, z), weight * (half + x) * np.hypot(half - x, z)
+        if np.mean((np.minimum(*tensions) >= 1.0) & (np.maximum(*tensions) <= 30.0)) >= 0.8:
+            break
+    assert best.values == (pytest.approx(2.0 * half, abs=3e-5), pytest.approx(0.8))
+
+
 def test_the_front_of_a_fraction(tmp_path):
     """Neither objective is surpassed by another robot of the front; numbers that jump need no derivatives."""
     data = design(PLANAR, WIDE, maps={"places": RECTANGLE}, search={"screen": 16, "generations": 2, "front": 4})
