@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import jax
@@ -11,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.motion.formulas import Expression, MotionPiece, powers, rationals, rotated_by
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import cross, rotated
 from cspr_jax.numerics.bounds.piecewise_bounds import overlaps, piecewise_bounds
@@ -105,6 +109,38 @@ class Spline:
         quaternion = None if self.quaternion is None else np.asarray(self.quaternion)
         bounds = spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
         return bounds if self.offset is None else moved(bounds, self.offset)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        knots, tables = rationals(self.knots), [np.asarray(self.position)]
+        tables += [] if self.quaternion is None else [np.asarray(self.quaternion)]
+        offset = None if self.offset is None else rationals(self.offset)
+        pieces = []
+        for i, (start, end) in enumerate(itertools.pairwise(knots)):
+
+            def curve(u: Expression, i: int = i, width: Fraction = end - start) -> Any:
+                position, *turning = (_polynomials(rationals(table[i]), u / width) for table in tables)
+                if not turning or offset is None:
+                    return position, turning[0] if turning else None
+                arm = rotated_by(turning[0], offset)
+                return [x + y for x, y in zip(position, arm, strict=True)], turning[0]
+
+            if start < end:
+                pieces.append(MotionPiece(start, end, curve))
+        return pieces
+
+
+def _polynomials(table: list[list[Fraction]], x: Expression) -> list[Expression]:
+    # Functions with these Bernstein coefficients (degree + 1, n).
+    degree = len(table) - 1
+    columns = []
+    for column in zip(*table, strict=True):
+        differences, row = list[Fraction](), list(column)
+        while row:
+            differences.append(row[0])
+            row = [after - before for before, after in itertools.pairwise(row)]
+        columns.append(powers([math.comb(degree, k) * c for k, c in enumerate(differences)], x))
+    return columns
 
 
 jax.tree_util.register_dataclass(

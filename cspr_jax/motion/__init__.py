@@ -5,6 +5,7 @@ motion of any robot; answers, legs and waypoints are common to all families. No 
 
 Files, each importing only from those above it:
 
+    formulas            formulas of motions with rational numbers, for exact decisions and certificates
     motion              the protocol: duration, state, breaks; motions reversed and placed
     ticks               ticks of a clock over consecutive motions
     amplitudes          amplitude functions A(tau), with bounds of their derivatives

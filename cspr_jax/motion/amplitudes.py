@@ -7,8 +7,11 @@ proofs between samples know the largest value of any derivative.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +20,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
+from cspr_jax.motion.formulas import Expression, MotionPiece, powers, rational, rationals
 from cspr_jax.numerics.elementary import as_float64, polynomial
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -184,6 +188,45 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
     if not 1 <= len(coefficients) <= 20 or not all(abs(c) <= LARGEST_COEFFICIENT for c in coefficients):
         raise InputError("polynomial", list(coefficients), "1 to 20 coefficients of at most 1e9, lowest power first")
     return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
+
+
+class LawPiece(NamedTuple):
+    """A piece of an amplitude function, or of another law of normalised time, with rational numbers.
+
+    Fields:
+        coefficients: of the powers of tau minus the origin, the constant first.
+        origin: tau about which the piece is expanded.
+    """
+
+    coefficients: list[Fraction]
+    origin: Fraction
+
+    def at(self, tau: Expression, order: int = 0) -> Expression:
+        """The law, or one of its derivatives by tau."""
+        table = [math.perm(i, order) * c for i, c in enumerate(self.coefficients) if i >= order]
+        while len(table) > 1 and not table[-1]:
+            table.pop()
+        return powers(table, tau - self.origin)
+
+
+def law_pieces(
+    laws: Sequence[Amplitude],
+    duration: Any,
+    curve: Callable[[Expression, list[LawPiece]], tuple[list[Expression], list[Expression] | None]],
+) -> list[MotionPiece]:
+    """Pieces of a motion along laws with the same knots; `curve` is a function of normalised time and their pieces."""
+    time, knots = rational(duration), [Fraction(0), *rationals(laws[0].knots), Fraction(1)]
+    tables = [zip(rationals(law.coefficients), rationals(law.origins), strict=True) for law in laws]
+    pieces = []
+    for (first, last), *rows in zip(itertools.pairwise(knots), *tables, strict=True):
+        each = [LawPiece(*row) for row in rows]
+
+        def of_time(u: Expression, first: Fraction = first, each: list[LawPiece] = each) -> Any:
+            return curve(u / time + first, each)
+
+        if first < last:
+            pieces.append(MotionPiece(time * first, time * last, of_time))
+    return pieces
 
 
 def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:

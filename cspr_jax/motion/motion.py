@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.motion.formulas import HasFormulas, MotionPiece, backwards
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.numerics.shapes import Float
@@ -119,6 +120,10 @@ class Backwards(Generic[Kind]):
         """Bounds of the states, of a motion that has them; see `BoundedMotion.bounds`."""
         full, motion = float(self.duration()), cast(BoundedMotion, self.motion)
         return state_bounds.backwards(motion.bounds(full - end, full - start))
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas, of a motion that knows them; see `motion.formulas.HasFormulas`."""
+        return backwards(cast(HasFormulas, self.motion).formulas())
 
 
 @jax.tree_util.register_dataclass

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.motion.amplitudes import LawPiece
+from cspr_jax.motion.formulas import Expression, combined, function, pi, rational, rationals
 from cspr_jax.numerics.elementary import length
 from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.model.point_mass import AT_P0
@@ -52,3 +55,19 @@ def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
     upright = norm < UPRIGHT
     fallback = x_axis - q1 * jnp.dot(q1, x_axis)
     return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, norm))
+
+
+def swing_formula(segment: Any, arcs: Any, law: LawPiece, tau: Expression, *, variable: bool) -> list[Expression]:
+    """Position of a hypocycloid of constant or variable amplitude, (2.31) and (3.44), in the precessing frame."""
+    p, sense, precession, start, end = map(
+        rational, (arcs, segment.sense, segment.precession, segment.start_radius, segment.end_radius)
+    )
+    radius, phase, turn = law.at(tau) * (end - start) + start, tau * (sense * p), tau * (sense * precession)
+    sine, cosine = function("sin_pi", phase), function("cos_pi", phase)
+    lateral, axial = function("sin_pi", turn), function("cos_pi", turn)
+    along, across = radius * cosine, radius * sine * (precession / p)
+    if variable:
+        along = along - law.at(tau, 1) * ((end - start) / (sense * p)) * sine / pi()
+    forward, sideways = axial * along + lateral * across, axial * across - lateral * along
+    columns = zip(*rationals(segment.plane), strict=True)
+    return combined([1, forward, sideways], [rationals(segment.center), *columns])

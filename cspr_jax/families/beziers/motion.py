@@ -8,6 +8,7 @@ segments meet, both are equal (15).
 from __future__ import annotations
 
 import dataclasses
+from fractions import Fraction
 from typing import Any
 
 import jax
@@ -15,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.motion.formulas import Expression, MotionPiece, combined, function, rational, rationals
 from cspr_jax.numerics import elementary
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
@@ -68,6 +70,17 @@ class Bezier:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         return many_bounds(jax.tree.map(lambda x: np.asarray(x)[None], self), np.zeros(len(start), int), start, end)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        square, linear, rest = (rationals(x) for x in powers(*map(np.asarray, (self.start, self.middle, self.end))))
+        time = rational(self.time)
+
+        def curve(u: Expression) -> tuple[list[Expression], None]:
+            c = function("cos_pi", u / time)
+            return combined([c * c, c, 1], [square, linear, rest]), None
+
+        return [MotionPiece(Fraction(0), time, curve)]
 
 
 def many_bounds(

@@ -22,8 +22,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.families.ellipses.harmonics import Ellipse
-from cspr_jax.families.ellipses.rotation import Rotation, rotation_bounds, rotation_state
-from cspr_jax.motion.amplitudes import Amplitude, derivatives, from_pieces, named
+from cspr_jax.families.ellipses.rotation import Rotation, rotation_bounds, rotation_formula, rotation_state
+from cspr_jax.motion.amplitudes import Amplitude, LawPiece, derivatives, from_pieces, law_pieces, named
+from cspr_jax.motion.formulas import Expression, MotionPiece, combined, function, rational, rationals
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.function_bounds import sincospi
@@ -98,6 +99,25 @@ class EllipseMotion:
             time_bounds(self.progress, self.time, start, end, orders=1).values[0],
         )
         return in_batches(partial(_bounds, self), blocks, batch_size=BATCH)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        first, last = ([rationals(vector) for vector in ellipse] for ellipse in (self.first, self.last))
+        (start, end), phase, time = rationals(self.frequencies), rational(self.phase), rational(self.time)
+
+        def curve(tau: Expression, laws: list[LawPiece]) -> tuple[list[Expression], list[Expression] | None]:
+            s, rest = laws[0].at(tau), 1 - laws[0].at(tau)
+            angle = tau * (start * time) + phase
+            if start != end:
+                angle = angle + laws[1].at(tau) * ((end - start) * time)
+            cosine, sine = function("cos", angle), function("sin", angle)
+            factors: list[Any] = [1, cosine, sine]
+            position = combined([s * x for x in factors] + [rest * x for x in factors], [*last, *first])
+            if self.rotation is None:
+                return position, None
+            return position, rotation_formula(self.rotation, s, cosine, sine)
+
+        return law_pieces([self.law, self.progress], self.time, curve)
 
 
 def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:

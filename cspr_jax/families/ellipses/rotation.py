@@ -9,12 +9,14 @@ of the last along s, as the half-axes do.
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.motion.formulas import Expression, constant, function, product, rational, rationals
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, rotated
 from cspr_jax.numerics.bounds.function_bounds import sincospi
 from cspr_jax.numerics.bounds.rotation_bounds import RotationBounds
@@ -72,6 +74,19 @@ def rotation_state(
     oscillating = psi[1] * rotation.axis
     rate = psi[2] * rotation.axis + second_derivative + jnp.cross(oscillating, turning)
     return rotations.matrix(quaternion), oscillating + turning, rate, quaternion
+
+
+def rotation_formula(rotation: Rotation, s: Expression, cosine: Expression, sine: Expression) -> list[Expression]:
+    """Quaternion of the rotation; see `rotation_state`."""
+    direction, angle = _direction(jnp.asarray(rotation.turn))
+    (p0, q0), (p1, q1) = rationals(rotation.first), rationals(rotation.last)
+    psi = (s * (p1 - p0) + p0) * cosine + (s * (q1 - q0) + q0) * sine
+
+    def about(axis: Any, half: Expression) -> list[Expression]:
+        return [function("cos", half), *(function("sin", half) * x for x in rationals(axis))]
+
+    swing, turn = about(rotation.axis, psi * Fraction(1, 2)), about(direction, s * (rational(angle) / 2))
+    return product(swing, product(turn, [constant(x) for x in rationals(rotation.start)]))
 
 
 def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:

@@ -16,7 +16,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.motion import amplitudes
-from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.motion.amplitudes import Amplitude, derivatives, law_pieces
+from cspr_jax.motion.formulas import MotionPiece, combined, rationals
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds
@@ -105,6 +106,13 @@ class TimedLine:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         blocks = time_bounds(self.law, self.time, start, end)
         return in_batches(partial(_bounds, self), blocks, batch_size=BATCH)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        start, direction = rationals(self.start), rationals(self.direction)
+        return law_pieces(
+            [self.law], self.time, lambda tau, laws: (combined([1, laws[0].at(tau)], [start, direction]), None)
+        )
 
 
 @persistent_jit

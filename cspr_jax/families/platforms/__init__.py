@@ -13,6 +13,7 @@ Files, each importing only from those above it:
 
     oscillating_slerp        oscillating rotation, section 3.7
     slerp_bounds             bounds of this rotation over a block of time
+    slerp_formulas           formulas of this rotation with rational numbers
     platform_segment         segment between two poses, (3.42) to (3.66), and batches of segments
     platform_segment_lanes   the same motion, one lane a segment
     from_rest_lanes          the same motion from rest, with the fewest operations

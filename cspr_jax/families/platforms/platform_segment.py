@@ -25,9 +25,11 @@ from jax import Array
 
 from cspr_jax.families.platforms.oscillating_slerp import Slerp, orientation, rates, rotation_law, slerp_between
 from cspr_jax.families.platforms.slerp_bounds import orientation_bounds, rotation_law_bounds
-from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.families.platforms.slerp_formulas import orientation_formula, rotation_law_formula
+from cspr_jax.motion.amplitudes import Amplitude, LawPiece, derivatives, law_pieces
+from cspr_jax.motion.formulas import Expression, MotionPiece, rational
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
-from cspr_jax.motion.swing_plane import swing_plane
+from cspr_jax.motion.swing_plane import swing_formula, swing_plane
 from cspr_jax.numerics.bounds.rotation_bounds import unit_rotation_bounds
 from cspr_jax.numerics.elementary import sincospi
 from cspr_jax.numerics.linear import rotations
@@ -224,6 +226,18 @@ class PlatformMotion:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         return self.batch([self]).bounds(np.zeros(len(start), int), start, end)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        segment, kind = self.segment, self.kind
+        fraction = _rate_fraction(segment, self.arcs)
+        betas = [rational(x) for x in (*_beta_hats(segment, fraction, kind), fraction, self.arcs)]
+
+        def curve(tau: Expression, laws: list[LawPiece]) -> tuple[list[Expression], list[Expression]]:
+            position = swing_formula(segment, self.arcs, laws[0], tau, variable=kind.variable)
+            return position, orientation_formula(segment.slerp, laws[0].at(tau), rotation_law_formula(betas, tau))
+
+        return law_pieces([self.amplitude], self.duration(), curve)
 
     @staticmethod
     def batch(motions: Sequence["PlatformMotion"]) -> MotionBatch:

@@ -27,8 +27,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.motion.amplitudes import Amplitude, derivatives
-from cspr_jax.motion.swing_plane import swing_plane
+from cspr_jax.motion.amplitudes import Amplitude, LawPiece, derivatives, law_pieces
+from cspr_jax.motion.formulas import Expression, MotionPiece
+from cspr_jax.motion.swing_plane import swing_formula, swing_plane
 from cspr_jax.numerics.elementary import maximum_of, sincospi
 from cspr_jax.numerics.shapes import Bool, Float, Num
 from cspr_jax.robots.bounds.state_bounds import StateBounds
@@ -239,6 +240,15 @@ class Hypocycloid:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         return self.batch([self]).bounds(np.zeros(len(start), int), start, end)
+
+    def formulas(self) -> list[MotionPiece]:
+        """Formulas; see `motion.formulas.HasFormulas`."""
+        segment = self.segment
+
+        def curve(tau: Expression, laws: list[LawPiece]) -> tuple[list[Expression], None]:
+            return swing_formula(segment, self.arcs, laws[0], tau, variable=False), None
+
+        return law_pieces([self.amplitude], self.duration(), curve)
 
     @staticmethod
     def batch(motions: Sequence["Hypocycloid"]) -> MotionBatch:
