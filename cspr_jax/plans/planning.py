@@ -30,7 +30,9 @@ from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.runtime.exact_arithmetic import HOW, has_exact
 from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.verdicts import Verdict
 
 if TYPE_CHECKING:
     from cspr_jax.machine.motion_frequencies import MotionFrequencies
@@ -71,6 +73,7 @@ class PlannedMotions:
         text: text of the plan file; empty for a plan without a file.
         point: point of the platform whose positions files and pictures hold, one of `config.motions.table.POINTS`.
         frequencies: natural frequencies along the n segments; None on cables that do not stretch.
+        digits: digits to which causes, demands and margins are exact; None: those of the proof and of samples.
     """
 
     robot_file: RobotFile
@@ -87,6 +90,7 @@ class PlannedMotions:
     text: str = ""
     point: str = "mass-centre"
     frequencies: "tuple[MotionFrequencies, ...] | None" = None
+    digits: int | None = None
 
     @property
     def is_at_origin(self) -> bool:
@@ -187,7 +191,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     frequencies, resonances = _frequencies(problem, robot_file, frame, legs, plan_file, z0)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)] + resonances
     lines += nearly_resting(sequence.waypoints, z0) + _renumbered(robot_file)
-    lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
+    lines += _missed(plan_file, np.concatenate([leg.answers.feasible for leg in legs]), extremes) + _undecided(legs)
     return PlannedMotions(
         robot_file=robot_file,
         keys=plan_file,
@@ -329,6 +333,12 @@ def _check_rule(problem: Problem, plan_file: PlanFile, path: Path) -> None:
     if TENSION_RULES[rule].is_bounded and not np.isfinite(np.asarray(tension_range(robot, problem.limits)[1])).all():
         others = " or ".join(f'"{name}"' for name, row in TENSION_RULES.items() if not row.is_bounded)
         raise ConfigError(path, f'tensions = "{rule}": must be {others} without tension_max of every cable')
+
+
+def _undecided(legs: tuple[JoinedLeg, ...]) -> list[str]:
+    # How to decide segments that are left open.
+    is_open = any((leg.answers.verdict & Verdict.UNDECIDED.value).any() for leg in legs)
+    return [f"undecided: exact arithmetic decides most such motions: {HOW}"] if is_open and not has_exact() else []
 
 
 def _missed(plan_file: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[str]:

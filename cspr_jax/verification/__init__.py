@@ -14,6 +14,8 @@ Files, each importing only from those above it:
     piece_slacks      slacks of any motion over each of its pieces
     feeds             proof of largest speeds of single pieces of a motion
     proved_answers    answers of motions that give bounds of their states
+    exact             exact decisions of open criteria, extremes to any number of digits
+    certificates      proofs in a form that others can check
     mean_torques      root mean squares of motor torques over a full motion
     attained          smallest slacks that proved motions attain, and when
     smallest_proved   smallest numbers whose motions are proved, of many motions at once

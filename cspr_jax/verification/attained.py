@@ -11,14 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.motion.answers import AnyAnswers
+from cspr_jax.motion.answers import FEWER, AnyAnswers
+from cspr_jax.motion.formulas import HasFormulas
 from cspr_jax.motion.motion import BESIDE, Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_values
 from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.runtime.exact_arithmetic import has_exact
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
-from cspr_jax.verification.criteria import levels
+from cspr_jax.verification.criteria import ALL, levels
 from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
@@ -43,7 +46,7 @@ def with_attained(
             proofs[i] = proof_of(problem, motion, scene)
         if proofs[i] is not None:
             proofs[i] = attained(problem, motion, proofs[i], scene)
-    answers = dataclasses.replace(answers, proof=proofs)
+    answers = _with_verdicts(dataclasses.replace(answers, proof=proofs))
     if answers.margin_unit != "N" or not all(proofs):
         return answers
     moves = np.isfinite(answers.duration)
@@ -53,8 +56,35 @@ def with_attained(
     return dataclasses.replace(answers, **margins)
 
 
+def _with_verdicts(answers: AnyAnswers) -> AnyAnswers:
+    # Take the verdicts of full proofs where families, or bounds, leave them open; not where robots are uncertain.
+    rows = [
+        i
+        for i, proof in enumerate(answers.proof)
+        if proof is not None
+        and proof.parts == ALL
+        and answers.verdict[i] & ~FEWER == Verdict.UNDECIDED.value
+        and np.isnan(answers.tolerated[i])
+    ]
+    verdict, arcs = answers.verdict.copy(), answers.arcs.copy()
+    for i in rows:
+        verdict[i] = (answers.verdict[i] & FEWER) | FLAGS(answers.proof[i].verdict.value)
+        arcs[i] = answers.tried_arcs[i] if answers.proof[i].is_feasible else arcs[i]
+    return dataclasses.replace(answers, verdict=verdict, arcs=arcs)
+
+
 def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None) -> MotionProof:
-    """The proof with smallest slacks, and times, that the motion attains."""
+    """The proof with smallest slacks, and times, that the motion attains; open criteria are decided exactly."""
+    case = _sampled(problem, motion, case, scene)
+    if case.verdict != Verdict.UNDECIDED or not (has_exact() and isinstance(motion, HasFormulas)):
+        return case
+    from cspr_jax.verification.exact.decisions import decided  # few motions are open
+
+    return decided(problem, motion, case, scene)
+
+
+def _sampled(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None) -> MotionProof:
+    # The proof with samples in place of upper bounds.
     proof, duration = case.proof, float(motion.duration())
     columns = _nearest(case)
     if proof.near is None or not len(columns) or not np.isfinite(duration):

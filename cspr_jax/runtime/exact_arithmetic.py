@@ -1,0 +1,20 @@
+"""The library for exact arithmetic, which is optional; without jax."""
+
+import functools
+import importlib.util
+
+from cspr_jax.errors import ConfigError
+
+HOW = "pip install 'cspr_jax[exact]'"
+
+
+@functools.cache
+def has_exact() -> bool:
+    """Tell whether the library is installed."""
+    return importlib.util.find_spec("flint") is not None
+
+
+def need_exact(key: str) -> None:
+    """Refuse an option or argument that needs the library where it is not installed, and say how to install it."""
+    if not has_exact():
+        raise ConfigError(key, f"python-flint is not installed: {HOW}")

@@ -1,0 +1,198 @@
+"""Series of balls: functions of time around a time, with bounds of their coefficients that include all rounding.
+
+A motion over a block of time is a power series whose coefficients are balls. Around the exact middle the balls are
+tiny; with a ball in place of the middle, coefficient k encloses that of every time within the block, so that the last
+one bounds the remainder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import flint
+
+from cspr_jax.motion.formulas import MotionPiece, Program, program
+
+ORDER = 3  # coefficients of slacks: value, first derivative, half of the second one
+STATES = ORDER + 2  # coefficients of positions, whose second derivatives enter slacks
+Series: Any = flint.arb_series
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """Compute with balls of this precision, and with as many coefficients as slacks need."""
+    earlier = flint.ctx.prec, flint.ctx.cap
+    flint.ctx.prec, flint.ctx.cap = bits, STATES
+    try:
+        yield
+    finally:
+        flint.ctx.prec, flint.ctx.cap = earlier
+
+
+def ball(number: Fraction | float | int | str) -> flint.arb:
+    """Ball around a rational number."""
+    value = Fraction(number)
+    return flint.arb(flint.fmpq(value.numerator, value.denominator))
+
+
+def number(value: flint.arb) -> Fraction:
+    """Exact rational number of the middle of a ball."""
+    mantissa, exponent = value.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+class SeriesState(NamedTuple):
+    """Position and orientation with derivatives, as series; lists of 3, of rotations 3 lists of 3.
+
+    Fields:
+        time: since the start of the piece, s.
+        position: m.
+        velocity: m/s.
+        acceleration: m/s^2.
+        rotation: None for a point mass.
+        angular_velocity: fixed axes, rad/s.
+        angular_acceleration: rad/s^2.
+    """
+
+    time: Any
+    position: list[Any]
+    velocity: list[Any]
+    acceleration: list[Any]
+    rotation: Any = None
+    angular_velocity: Any = None
+    angular_acceleration: Any = None
+
+
+class SeriesPiece:
+    """MotionPiece of a motion that is evaluated as series.
+
+    Args:
+        piece: with its formulas.
+    """
+
+    def __init__(self, piece: MotionPiece) -> None:
+        """Find the program of the piece."""
+        self.start, self.end = piece.start, piece.end
+        position, quaternion = piece.components
+        self.program: Program = program([*position, *(quaternion or [])])
+        self._is_body = quaternion is not None
+        self._coefficients: dict[int, list[list[flint.arb]]] = {}
+
+    def state(self, middle: flint.arb, radius: flint.arb | None = None) -> SeriesState:
+        """State around a time since the start of the piece; with a radius, enclosed for all times within it."""
+        u = Series([middle if radius is None else middle + flint.arb(0, radius), 1])
+        values = run(self._steps(), u, lambda x: Series([x]))
+        outputs = [values[i] for i in self.program.outputs]
+        position, velocity = outputs[:3], [x.derivative() for x in outputs[:3]]
+        acceleration = [x.derivative() for x in velocity]
+        if not self._is_body:
+            return SeriesState(u, position, velocity, acceleration)
+        return SeriesState(u, position, velocity, acceleration, *turning(outputs[3:]))
+
+    def _steps(self) -> list[tuple[str, Sequence[Any]]]:
+        # Coefficients become balls once for each precision.
+        bits = flint.ctx.prec
+        if bits not in self._coefficients:
+            self._coefficients[bits] = [
+                [ball(c) for c in operands] if name == "poly" else list(operands)
+                for name, operands in self.program.steps
+            ]
+        return [
+            (name, operands) for (name, _), operands in zip(self.program.steps, self._coefficients[bits], strict=True)
+        ]
+
+
+def run(steps: Sequence[tuple[str, Sequence[Any]]], u: Any, constant: Callable[[Any], Any]) -> list[Any]:
+    """Values of the steps of a program, in any arithmetic."""
+    values: list[Any] = []
+    for name, operands in steps:
+        if name == "poly":
+            value = constant(operands[-1])
+            for coefficient in reversed(operands[:-1]):
+                value = value * u + coefficient
+            values.append(value)
+        elif name in BINARY:
+            values.append(BINARY[name](values[operands[0]], values[operands[1]]))
+        elif name == "sqrt":
+            values.append(root(values[operands[0]]))
+        else:
+            values.append(getattr(values[operands[0]], name)())
+    return values
+
+
+def quotient(x: Any, y: Any) -> Any:
+    """Quotient; without bounds where the divisor may be zero."""
+    if isinstance(y, Series) and not (y[0] > 0 or y[0] < 0):
+        return _unbounded()
+    return x / y
+
+
+def root(x: Any) -> Any:
+    """Square root; without bounds where the number may be zero or negative."""
+    return x.sqrt() if x[0] > 0 else _unbounded()
+
+
+def _unbounded() -> Any:
+    return Series([flint.arb("nan")] * STATES)
+
+
+BINARY: dict[str, Callable[[Any, Any], Any]] = {
+    "+": lambda x, y: x + y,
+    "-": lambda x, y: x - y,
+    "*": lambda x, y: x * y,
+    "/": quotient,
+}
+
+
+def dot(left: Sequence[Any], right: Sequence[Any]) -> Any:
+    """Scalar product."""
+    total = left[0] * right[0]
+    for x, y in zip(left[1:], right[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def cross(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
+    """Vector product."""
+    (a, b, c), (x, y, z) = left, right
+    return [b * z - c * y, c * x - a * z, a * y - b * x]
+
+
+def times(matrix: Sequence[Sequence[Any]], vector: Sequence[Any]) -> list[Any]:
+    """Product of a matrix and a vector."""
+    return [dot(row, vector) for row in matrix]
+
+
+def absolute(x: Any) -> Any:
+    """Absolute value; where the sign is not known, without bounds from the second derivative on."""
+    value = x[0]
+    if value > 0:
+        return x
+    if value < 0:
+        return -x
+    rate = abs(x[1])
+    return Series([abs(value), rate.union(-rate), flint.arb("nan")], ORDER)
+
+
+def turning(quaternion: Sequence[Any]) -> tuple[list[list[Any]], list[Any], list[Any]]:
+    """Rotation matrix, angular velocity and acceleration of a quaternion of any norm."""
+    w, x, y, z = quaternion
+    square = dot(quaternion, quaternion)
+    rotation = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    first = [part.derivative() for part in quaternion]
+    across = cross(first[1:], [x, y, z])
+    velocity = [
+        quotient(2 * (first[k + 1] * w - first[0] * part - across[k]), square) for k, part in enumerate((x, y, z))
+    ]
+    return (
+        [[quotient(part, square) for part in row] for row in rotation],
+        velocity,
+        [part.derivative() for part in velocity],
+    )
