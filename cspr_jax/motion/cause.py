@@ -49,6 +49,7 @@ class Cause:
         allowed: largest, or smallest, value that is allowed.
         unit: unit of both; "" where there are none.
         obstacle: name of the obstacle that is touched; "" where none is.
+        digits: digits of numbers in the text; None: as many as tell needed and allowed apart.
     """
 
     criterion: str
@@ -58,6 +59,7 @@ class Cause:
     allowed: float = math.nan
     unit: str = ""
     obstacle: str = ""
+    digits: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The cause as a plan's JSON has it."""
@@ -74,10 +76,11 @@ class Cause:
         flag, numbers = Verdict[self.criterion.upper()], " and ".join(str(k + 1) for k in self.cables)
         if not math.isfinite(self.needed) and flag not in (Verdict.SINGULAR, Verdict.CABLE_PLATFORM):
             return flag.text.replace("_", " ")
-        when = f" at t = {self.t:.2f} s" if math.isfinite(self.t) else ""
+        time = f"{self.t:.2f}" if self.digits is None else f"{self.t:.{self.digits}g}"
+        when = f" at t = {time} s" if math.isfinite(self.t) else ""
         if flag is Verdict.ABOVE_SPOOLS and not -self.needed > ON_PLANE:
             return f"on the plane of the spools{when}"
-        needed, allowed = _told_apart(self.needed, self.allowed)
+        needed, allowed = _told_apart(self.needed, self.allowed, self.digits or DIGITS)
         is_together = not self.cables and flag in _OF_MOTORS
         return (_TOGETHER if is_together else _WORDS.get(flag, _USUAL)).format(
             quantity=_OF_MOTORS.get(flag, ""),
@@ -85,7 +88,7 @@ class Cause:
             cable=f"cable{'s' if len(self.cables) > 1 else ''} {numbers}",
             needed=needed,
             allowed=allowed,
-            missed=f"{max(0.0, -self.needed):.{DIGITS}g}",
+            missed=f"{max(0.0, -self.needed):.{self.digits or DIGITS}g}",
             body=f"cable {numbers}" if numbers else "the platform",
             obstacle=self.obstacle or "an obstacle",
             unit=self.unit.replace("^2", "²"),
@@ -93,9 +96,9 @@ class Cause:
         )
 
 
-def _told_apart(first: float, second: float) -> tuple[str, str]:
+def _told_apart(first: float, second: float, fewest: int) -> tuple[str, str]:
     # Write two numbers with as few digits as tell them apart.
-    for digits in range(DIGITS, MOST_DIGITS + 1):
+    for digits in range(fewest, max(fewest, MOST_DIGITS) + 1):
         texts = tuple(f"{value:.{digits}g}" for value in (first, second))
         if texts[0] != texts[1]:
             break

@@ -49,7 +49,8 @@ def binding(
 def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
     # Slacks (m, 1), or (m, n_cables), of each criterion, scaled as in `verification.proved_answers`.
     robot, limits = problem.robot, problem.limits
-    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    # On a guide a single spool is the centroid itself.
+    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot)) or 1.0
     low, high = (np.asarray(side, float) for side in tension_range(robot, limits))
     tension = of_cables["tension"]
     rows = [(Verdict.SLACK_CABLE, (tension - low) / weight)]

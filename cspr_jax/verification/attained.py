@@ -21,7 +21,7 @@ from cspr_jax.runtime.exact_arithmetic import has_exact
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
-from cspr_jax.verification.criteria import ALL, levels
+from cspr_jax.verification.criteria import levels
 from cspr_jax.verification.proved_answers import MotionProof, margins_of, proof_of
 from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
@@ -62,7 +62,6 @@ def _with_verdicts(answers: AnyAnswers) -> AnyAnswers:
         i
         for i, proof in enumerate(answers.proof)
         if proof is not None
-        and proof.parts == ALL
         and answers.verdict[i] & ~FEWER == Verdict.UNDECIDED.value
         and np.isnan(answers.tolerated[i])
     ]

@@ -359,6 +359,7 @@ def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
     # Scales are weight / n_cables for tensions, the robot's radius for lengths, and the allowed value for others.
     robot = problem.robot
-    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    # On a guide a single spool is the centroid itself.
+    weight, radius = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot)) or 1.0
     of_unit = {"N": weight, "m": radius, "1": 1.0}
     return np.array([of_unit.get(row.unit, row.allowed) for row in rows])

@@ -23,7 +23,7 @@ from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import Bodies, Shape, bodies_of, contact_pairs, has_sectors
 from cspr_jax.verification.exact.components import Component
 from cspr_jax.verification.exact.kinematics import Kinematics, balls
-from cspr_jax.verification.exact.series import cross, dot, times
+from cspr_jax.verification.exact.series import cross, dot, quotient, root, times
 
 Points = Callable[[Kinematics], list[list[Any]]]
 INWARD = 1e-13  # a direction leans this much out of a sector, so that rounding leaves it polar
@@ -99,13 +99,14 @@ def _components(k: int, pair: BodyPair, at: Kinematics) -> list[Component]:
         at.directions[k] = pair.direction(pair.differences_at(at))
     direction, weights = at.directions[k]
     below = direction_components(at, pair, direction)
-    if pair.sector is not None or not at.is_point:
+    if pair.sector is not None:
         return below
     factors = balls(weights)
     between = [dot(factors, column) for column in zip(*pair.differences(at), strict=True)]
     square = dot(between, between)
     # Dividing by the sum of the weights, 1 but for rounding, makes this the distance of two points of the bodies.
-    return [*below, Component(square.sqrt() / sum(factors) - flint.arb(pair.radius))] if square[0] > 0 else below
+    distance = quotient(root(square), sum(factors)) - flint.arb(pair.radius)
+    return [*below, Component(distance, at.is_point and bool(square[0] > 0))]
 
 
 def direction_components(at: Kinematics, pair: BodyPair, direction: Float[np.ndarray, "3"]) -> list[Component]:

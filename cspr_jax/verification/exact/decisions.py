@@ -6,7 +6,9 @@ is open.
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Any
@@ -17,20 +19,22 @@ import numpy as np
 from cspr_jax.motion.formulas import MotionPiece
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Float
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.criteria import Criterion, levels
 from cspr_jax.verification.exact.algebra import ROOT_BITS, decided_sign
 from cspr_jax.verification.exact.components import Component
 from cspr_jax.verification.exact.kinematics import Kinematics
 from cspr_jax.verification.exact.minimum import Components, Minimum, PiecePart, minimum
-from cspr_jax.verification.exact.series import SeriesPiece, ball, precision
+from cspr_jax.verification.exact.series import SeriesPiece, SeriesPieces, ball, precision
 from cspr_jax.verification.exact.slacks import SlackFunction, slack_functions
 from cspr_jax.verification.proved_answers import MotionProof
 from cspr_jax.verification.time_proof import TimeProof
 
 BITS = 256  # precision of balls, of which bounds of slacks lose some dozens
 MET = 1e-30  # a slack nearer to its level than this, over its scale, is left to algebra
-MOST_BLOCKS = 20_000  # largest number of blocks for one criterion
+MOST_BLOCKS = 20_000  # largest number of blocks for one criterion, some ten seconds
+FACETS = 8  # so many facets of redundant cables cost as much as all else
 
 
 def decided(problem: Problem, motion: Any, case: MotionProof, scene: Scene | None = None) -> MotionProof:
@@ -40,7 +44,7 @@ def decided(problem: Problem, motion: Any, case: MotionProof, scene: Scene | Non
     is_open = ~((case.proof.low > level) | case.broken)[: len(functions)]
     with precision(BITS):
         formulas = motion.formulas()
-        pieces = [SeriesPiece(piece) for piece in formulas]
+        pieces = SeriesPieces(formulas)
         for k in np.flatnonzero(is_open).tolist():
             function = functions[k]
             if function is None:
@@ -58,7 +62,8 @@ def _met_exactly(
 ) -> TimeProof:
     # The proof with one criterion decided by algebra: touched limits are met, cables that just lose tension are not.
     with precision(ROOT_BITS):
-        for piece, first, last in _overlaps(formulas, proof.open[k]):
+        for index, first, last in _overlaps(formulas, proof.open[k]):
+            piece = formulas[index]
             answer = decided_sign(problem, row, piece, (first - piece.start, last - piece.start))
             if answer.is_met is None:
                 return proof
@@ -93,7 +98,7 @@ def _with(proof: TimeProof, k: int, level: float, answer: Minimum) -> TimeProof:
 def sign(
     problem: Problem,
     function: SlackFunction,
-    pieces: list[SeriesPiece],
+    pieces: SeriesPieces,
     intervals: Float[np.ndarray, "m 2"],
     level: float,
     met: float,
@@ -104,7 +109,15 @@ def sign(
         is_near = answer.low > level - met and answer.high < level + met
         return bool(answer.low > level or answer.high < level or is_near)
 
-    return minimum(components_of(problem, function), blocks_of(pieces, intervals), is_enough, MOST_BLOCKS)
+    return minimum(
+        components_of(problem, function), blocks_of(pieces, intervals), is_enough, largest_count(problem.robot)
+    )
+
+
+def largest_count(robot: AnyRobot) -> int:
+    """Largest number of blocks for one criterion of a robot, so that a decision takes no more than some minutes."""
+    facets = math.comb(robot.n_cables, robot.dof - 1) if robot.n_cables > robot.dof else 0
+    return MOST_BLOCKS // (1 + facets // FACETS)
 
 
 def components_of(problem: Problem, function: SlackFunction) -> Components:
@@ -120,16 +133,22 @@ def components_of(problem: Problem, function: SlackFunction) -> Components:
     return components
 
 
-def blocks_of(pieces: list[SeriesPiece], intervals: Float[np.ndarray, "m 2"]) -> Iterator[PiecePart]:
+def blocks_of(pieces: SeriesPieces, intervals: Float[np.ndarray, "m 2"]) -> Iterator[PiecePart]:
     """Parts of pieces that overlap intervals."""
-    for piece, low, high in _overlaps(pieces, intervals):
+    for index, low, high in _overlaps(pieces.formulas, intervals):
+        piece = pieces[index]
         yield PiecePart(piece, low - piece.start, high - piece.start)
 
 
-def _overlaps(pieces: Sequence[Any], intervals: Float[np.ndarray, "m 2"]) -> Iterator[tuple[Any, Fraction, Fraction]]:
-    # Pieces with the start and the end of what they share with intervals.
+def _overlaps(
+    pieces: Sequence[MotionPiece], intervals: Float[np.ndarray, "m 2"]
+) -> Iterator[tuple[int, Fraction, Fraction]]:
+    # Indices of pieces, with the start and the end of what they share with intervals.
+    ends = [float(piece.end) for piece in pieces]
     for first, last in intervals.tolist():
-        for piece in pieces:
-            low, high = max(Fraction(first), piece.start), min(Fraction(last), piece.end)
+        index = max(bisect.bisect_left(ends, first) - 1, 0)
+        while index < len(pieces) and pieces[index].start < last:
+            low, high = max(Fraction(first), pieces[index].start), min(Fraction(last), pieces[index].end)
             if low < high:
-                yield piece, low, high
+                yield index, low, high
+            index += 1

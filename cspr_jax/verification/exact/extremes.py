@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import flint
 import numpy as np
@@ -20,10 +20,10 @@ from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.model.winches import MotorDemands
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.verification.exact.components import Component
-from cspr_jax.verification.exact.decisions import BITS, MOST_BLOCKS, blocks_of, components_of
+from cspr_jax.verification.exact.decisions import BITS, blocks_of, components_of, largest_count
 from cspr_jax.verification.exact.kinematics import Kinematics, balls
 from cspr_jax.verification.exact.minimum import Components, Minimum, PiecePart, attained, minimum
-from cspr_jax.verification.exact.series import SeriesPiece, ball, dot, precision, quotient
+from cspr_jax.verification.exact.series import SeriesPieces, ball, dot, precision, quotient
 from cspr_jax.verification.exact.slacks import (
     QUANTITIES,
     SlackFunction,
@@ -40,20 +40,19 @@ def with_extremes(problem: Problem, motion: Any, case: MotionProof, scene: Scene
     """The proof with its smallest slacks, and their times, to a number of digits of the quantities."""
     low, high, when = (side.copy() for side in (case.proof.low, case.proof.high, case.proof.when))
     with precision(BITS):
-        pieces = [SeriesPiece(piece) for piece in motion.formulas()]
+        pieces = SeriesPieces(motion.formulas())
         for k, function in enumerate(slack_functions(problem, scene, case.parts)):
             if function is None:
                 continue
             offset = case.criteria[k].allowed * (1.0 if case.criteria[k].sense == "least" else -1.0)
-            answer = _enclosed(
-                components_of(problem, function), _near(pieces, case, k), digits, offset, SMALL * float(case.scales[k])
-            )
+            goal = Accuracy(digits, offset, SMALL * float(case.scales[k]), largest_count(problem.robot))
+            answer = _enclosed(components_of(problem, function), _near(pieces, case, k), goal)
             if answer is not None:
                 low[k], high[k], when[k] = answer
     return case._replace(proof=dataclasses.replace(case.proof, low=low, high=high, when=when))
 
 
-def _near(pieces: list[SeriesPiece], case: MotionProof, k: int) -> Iterable[PiecePart]:
+def _near(pieces: SeriesPieces, case: MotionProof, k: int) -> Iterable[PiecePart]:
     # Blocks that may hold the smallest slack of a criterion.
     near = case.proof.near
     if near is None:
@@ -62,13 +61,27 @@ def _near(pieces: list[SeriesPiece], case: MotionProof, k: int) -> Iterable[Piec
     return blocks_of(pieces, np.stack([near.start[chosen], near.end[chosen]], axis=1))
 
 
-def _all(pieces: list[SeriesPiece]) -> list[PiecePart]:
+def _all(pieces: SeriesPieces) -> list[PiecePart]:
     return [PiecePart(piece, Fraction(0), piece.end - piece.start) for piece in pieces]
 
 
-def _enclosed(
-    components: Components, blocks: Iterable[PiecePart], digits: int, offset: float, scale: float
-) -> tuple[float, float, float] | None:
+class Accuracy(NamedTuple):
+    """Accuracy that is asked for.
+
+    Fields:
+        digits: decimal digits of a quantity.
+        offset: what the quantity is more than the value that is enclosed, but for its sign.
+        scale: smaller quantities count as this.
+        largest_count: of blocks.
+    """
+
+    digits: int
+    offset: float
+    scale: float
+    largest_count: int
+
+
+def _enclosed(components: Components, blocks: Iterable[PiecePart], goal: Accuracy) -> tuple[float, float, float] | None:
     # Lower bound of the smallest value, a value at a floating-point time, and that time; None: not enclosed.
     blocks = list(blocks)
     if not blocks:
@@ -77,10 +90,10 @@ def _enclosed(
     def is_enough(answer: Minimum) -> bool:
         if not answer.value.is_finite():
             return False
-        error = 0.1**digits * max(abs(float(answer.value) + offset), scale)
+        error = 0.1**goal.digits * max(abs(float(answer.value) + goal.offset), goal.scale)
         return bool(answer.high - answer.low < error)
 
-    answer = minimum(components, blocks, is_enough, MOST_BLOCKS)
+    answer = minimum(components, blocks, is_enough, goal.largest_count)
     if not is_enough(answer):
         return None
     last = max(block.piece.end for block in blocks)
@@ -98,16 +111,11 @@ def exact_peaks(problem: Problem, motions: Sequence[Any], peaks: Peaks, digits: 
     when, cables = peaks.when.copy(), peaks.cables.copy()
     with precision(BITS):
         for i, motion in enumerate(motions):
-            pieces = [SeriesPiece(piece) for piece in motion.formulas()]
+            pieces = SeriesPieces(motion.formulas())
             for name, (sign, functions) in _quantities(problem).items():
                 column = EXTREMES.index(name)
-                answer = _enclosed(
-                    components_of(problem, _together(functions)),
-                    _all(pieces),
-                    digits,
-                    0.0,
-                    SMALL * abs(columns[name][i]),
-                )
+                goal = Accuracy(digits, 0.0, SMALL * abs(columns[name][i]), largest_count(problem.robot))
+                answer = _enclosed(components_of(problem, _together(functions)), _all(pieces), goal)
                 if answer is not None:
                     columns[name][i], when[i, column] = sign * answer[1], answer[2]
                     if len(functions) > 1:
@@ -119,8 +127,8 @@ def _together(functions: Sequence[SlackFunction]) -> SlackFunction:
     return lambda at: [component for function in functions for component in function(at)]
 
 
-def _lowest_cable(problem: Problem, pieces: list[SeriesPiece], functions: Sequence[SlackFunction], time: float) -> int:
-    piece = next(piece for piece in pieces if piece.start <= Fraction(time) <= piece.end)
+def _lowest_cable(problem: Problem, pieces: SeriesPieces, functions: Sequence[SlackFunction], time: float) -> int:
+    piece = pieces.at(Fraction(time))
     at = Kinematics(problem.robot, piece.state(ball(Fraction(time) - piece.start)))
     return int(np.argmin([float(attained(function(at))) for function in functions]))
 

@@ -129,9 +129,9 @@ def lowest(at: Any, over: Any, radius: flint.arb) -> tuple[flint.arb, Fraction]:
     curvature, offset = over[2].lower(), Fraction(0)
     if curvature.is_finite() and rate.is_finite():
         turn = -rate / (2 * curvature) if curvature > 0 else flint.arb("inf")
-        if curvature > 0 and abs(turn) < radius:
+        if curvature > 0 and not abs(turn) > radius:
             bounds.append((value - rate * rate / (4 * curvature)).lower())
-            offset = number(turn)
+            offset = max(-number(radius), min(number(radius), number(turn)))
         else:
             bounds.append((value - abs(rate) * radius + curvature * radius * radius).lower())
             offset = number(radius) * (-1 if rate > 0 else 1)

@@ -7,6 +7,7 @@ one bounds the remainder.
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -75,7 +76,7 @@ class SeriesPiece:
 
     def __init__(self, piece: MotionPiece) -> None:
         """Find the program of the piece."""
-        self.start, self.end = piece.start, piece.end
+        self.formula, self.start, self.end = piece, piece.start, piece.end
         position, quaternion = piece.components
         self.program: Program = program([*position, *(quaternion or [])])
         self._is_body = quaternion is not None
@@ -83,7 +84,7 @@ class SeriesPiece:
 
     def state(self, middle: flint.arb, radius: flint.arb | None = None) -> SeriesState:
         """State around a time since the start of the piece; with a radius, enclosed for all times within it."""
-        u = Series([middle if radius is None else middle + flint.arb(0, radius), 1])
+        u = Series([middle if radius is None else middle + flint.arb(0, radius.upper()), 1])
         values = run(self._steps(), u, lambda x: Series([x]))
         outputs = [values[i] for i in self.program.outputs]
         position, velocity = outputs[:3], [x.derivative() for x in outputs[:3]]
@@ -103,6 +104,40 @@ class SeriesPiece:
         return [
             (name, operands) for (name, _), operands in zip(self.program.steps, self._coefficients[bits], strict=True)
         ]
+
+
+class SeriesPieces:
+    """Pieces of a motion, each of which becomes one of series when it is first needed.
+
+    Args:
+        formulas: pieces of the motion, in order.
+    """
+
+    def __init__(self, formulas: Sequence[MotionPiece]) -> None:
+        """Hold the formulas."""
+        self.formulas = formulas
+        self._pieces: dict[int, SeriesPiece] = {}
+
+    def __getitem__(self, index: int) -> SeriesPiece:
+        """The piece of an index."""
+        if index not in self._pieces:
+            self._pieces[index] = SeriesPiece(self.formulas[index])
+        return self._pieces[index]
+
+    def at(self, time: Fraction) -> SeriesPiece:
+        """The piece in which a time lies."""
+        return self[min(bisect.bisect_left(self.formulas, time, key=lambda piece: piece.end), len(self.formulas) - 1)]
+
+    def around(self, time: Fraction) -> list[SeriesPiece]:
+        """The pieces that hold a time: two where one ends and the next begins."""
+        first = self.at(time)
+        index = self.formulas.index(first.formula)
+        later = self.formulas[index + 1 : index + 2]
+        return [first, *(self[index + 1] for piece in later if piece.start == time)]
+
+    def __iter__(self) -> Iterator[SeriesPiece]:
+        """All pieces."""
+        return (self[index] for index in range(len(self.formulas)))
 
 
 def run(steps: Sequence[tuple[str, Sequence[Any]]], u: Any, constant: Callable[[Any], Any]) -> list[Any]:

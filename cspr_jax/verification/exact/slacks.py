@@ -29,7 +29,7 @@ from cspr_jax.verification.exact.components import Component
 from cspr_jax.verification.exact.contacts import contact_functions
 from cspr_jax.verification.exact.facets import facet_slacks
 from cspr_jax.verification.exact.kinematics import Kinematics, balls
-from cspr_jax.verification.exact.series import absolute, dot
+from cspr_jax.verification.exact.series import ORDER, absolute, dot
 
 # Components of a slack of a robot at a state; None: no formula is known.
 SlackFunction = Callable[[Kinematics], list[Component]]
@@ -92,7 +92,9 @@ def _both(value: Any) -> list[Any]:
 def _norm(vector: list[Any]) -> Any:
     # A norm has no derivative where the vector vanishes, far from every limit.
     square = dot(vector, vector)
-    return square.sqrt() if square[0] > 0 else flint.arb_series([_largest_norm(vector), flint.arb("nan")])
+    if square[0] > 0:
+        return square.sqrt()
+    return flint.arb_series([_largest_norm(vector), *[flint.arb("nan")] * (ORDER - 1)], ORDER)
 
 
 def _largest_norm(vector: list[Any]) -> flint.arb:
