@@ -95,6 +95,7 @@ _MODULES = {
     "three_cable_equivalent": "api.robots",
     "transition": "api.families.motions",
     "verify": "api.sweeps",
+    "verify_certificate": "api.certificates",
     "with_cables": "api.robots",
     "workspace": "api.workspaces",
     "workspace_volume": "api.sweeps",

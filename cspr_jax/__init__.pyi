@@ -1,6 +1,7 @@
 """The public names for type checkers and editors, as `__init__.py` loads them."""
 
 from cspr_jax.api.calibration import calibrate as calibrate
+from cspr_jax.api.certificates import verify_certificate as verify_certificate
 from cspr_jax.api.checks import check as check
 from cspr_jax.api.designs import design as design
 from cspr_jax.api.differentiable import ellipse_margin as ellipse_margin

@@ -26,7 +26,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import reference_of, samples_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.errors.arguments import Cables, Points, Positive, Quaternions
+from cspr_jax.errors.arguments import Cables, Digits, Points, Positive, Quaternions
 from cspr_jax.families.splines.functions import FunctionMotion, function_motion
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
@@ -35,6 +35,7 @@ from cspr_jax.outputs import check_report
 from cspr_jax.outputs.limits_touched import TouchedLimit, limits_touched
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
+from cspr_jax.runtime.exact_arithmetic import need_exact
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.proved_answers import MotionProof
 from cspr_jax.verification.time_stretching import SLOWEST, least_stretching
@@ -223,6 +224,7 @@ def check(  # noqa: PLR0913
     duration: Positive | None = None,
     limits: LimitsOrSpec = None,
     without: Cables | None = None,
+    digits: Digits | None = None,
 ) -> Check:
     """Check with a proof whether a motion always keeps the limits of a robot.
 
@@ -245,6 +247,8 @@ def check(  # noqa: PLR0913
         duration: duration of a function, s; None for everything else.
         limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
         without: cables that are gone, from 0 on; limits of each cable still have one number per cable of the robot.
+        digits: digits, 1 to 15, to which causes, demands and margins are exact, of a motion that is held as a spline;
+            needs the package's extra `exact`. None: those of the proof and of samples.
 
     Returns:
         the check, feasible or not.
@@ -262,7 +266,7 @@ def check(  # noqa: PLR0913
     spec = check_keys(robot, limits, trajectory=trajectory, **settings)
     with double_precision():
         if isinstance(times, str | Path):
-            return check_file(Path(times), spec)
+            return check_file(Path(times), spec, digits=digits)
         plan = checked_plan(spec, NAME)
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
@@ -270,7 +274,7 @@ def check(  # noqa: PLR0913
             source = times
         else:
             source = _function(times, duration, plan)
-        return _check_of(plan.with_source(str(NAME), source), json_text(spec))
+        return _check_of(plan.with_source(str(NAME), source), json_text(spec), digits)
 
 
 def _is_curve(times: Any) -> bool:
@@ -291,14 +295,19 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
 
 
 def check_file(
-    motion: Path, spec: Mapping[str, Any], *, outputs: Sequence[str] = (), limits: Path | None = None
+    motion: Path,
+    spec: Mapping[str, Any],
+    *,
+    outputs: Sequence[str] = (),
+    limits: Path | None = None,
+    digits: int | None = None,
 ) -> Check:
     """Check the motion of a file."""
     with double_precision():
         data = {"schema": 1, "family": "spline", **spec, "motion": str(motion)}
         plan = checked_plan(data, motion)
         try:
-            return _check_of(plan, json_text(data))
+            return _check_of(plan, json_text(data), digits)
         except TooLongError as error:
             if outputs:
                 held = f"must be absent: {motion} is too long to be held, and checked in windows"
@@ -318,8 +327,15 @@ def _of_file(error: ConfigError, motion: Path, limits: Path | None) -> ConfigErr
     return ConfigError(limits if limits is not None and is_limit else motion, first, others=others)
 
 
-def _check_of(spec: PlanFile, text: str) -> Check:
-    return _shown(planning.plan_of(spec, NAME), text)
+def _check_of(spec: PlanFile, text: str, digits: int | None = None) -> Check:
+    planned = planning.plan_of(spec, NAME)
+    if digits is not None:
+        need_exact("digits")
+        from cspr_jax.plans.exact_digits import with_digits  # other checks do not need the library
+
+        around = planned.problem.robot, planned.robot_file, planned.frame, planned.keys, NAME
+        planned = with_digits(planned, digits, scene_of(*around, trajectory=planned.keys))
+    return _shown(planned, text)
 
 
 def _shown(planned: planning.PlannedMotions, text: str) -> Check:

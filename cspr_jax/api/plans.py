@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.plans import planning
+from cspr_jax.runtime.exact_arithmetic import need_exact
 from cspr_jax.schema import labelled
 from cspr_jax.schema.setpoints import USUAL_RATE
 from cspr_jax.store.files.disk import Disk
@@ -212,6 +214,46 @@ class Plan(Displayed, planning.PlannedMotions):
         except InputError as error:
             raise ConfigError(path, str(error)) from error
         publish(Disk(), path, data)
+        return path
+
+    def certificate(self) -> dict[str, Any]:
+        """Certificate of the motion, which the independent checker, or one of your own, can check.
+
+        Returns:
+            the content of the file, plain values for JSON; see docs/certificates.md.
+
+        Raises:
+            ConfigError: nothing is proved, the proof rests on what a certificate does not hold, or python-flint is not
+                installed.
+        """
+        need_exact("certificate")
+        from cspr_jax.plans.certificates import plan_certificate  # few plans are certified
+
+        with double_precision():
+            return plan_certificate(self, NAME)
+
+    @checked()
+    def save_certificate(self, path: str | Path) -> Path:
+        """Write a certificate of the motion, feasible or not.
+
+        Args:
+            path: file to write, .json; an existing file is replaced.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: as for `certificate`, or the wrong ending.
+            StoreError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix != ".json":
+            raise ConfigError(path, "must end in .json")
+        need_exact("certificate")
+        from cspr_jax.plans.certificates import plan_certificate  # few plans are certified
+
+        with double_precision():
+            publish(Disk(), path, (json.dumps(plan_certificate(self, path)) + "\n").encode("ascii"))
         return path
 
     def to_result(self) -> Result:

@@ -29,6 +29,7 @@ from cspr_jax.cli.plans import (
     write_files,
 )
 from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.runtime.exact_arithmetic import need_exact
 from cspr_jax.runtime.progress import waiting
 
 
@@ -59,6 +60,12 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--point",
         choices=("mass-centre", "origin"),
         help="point of a platform whose positions these are (default: as the file says, else its mass centre)",
+    )
+    parser.add_argument(
+        "--digits",
+        type=int,
+        metavar="N",
+        help="find causes, demands and margins to this number of digits, 1 to 15, by exact arithmetic",
     )
     parser.add_argument(
         "--slower",
@@ -101,12 +108,21 @@ def _check(options: argparse.Namespace) -> int:
     check_files(options)
     control = None if options.mjcf is None else options.mjcf.with_name(f"{options.mjcf.stem}_control.csv")
     written = {"-o": options.output, "--setpoints": options.setpoints, "--mjcf": options.mjcf}
+    written["--certificate"] = options.certificate
     for option, path in (*written.items(), ("--mjcf", control)):
         if path is not None and path.resolve() == options.motion.resolve():
             raise ConfigError(option, f"{path}: must be another name: the motion is there")
     settings = retime_settings(options)
     if options.retime and options.slower:
         raise ConfigError("--retime", "must be absent with --slower")
+    if options.digits is not None:
+        from cspr_jax.errors.arguments import MOST_DIGITS
+
+        need_exact("--digits")
+        if not 1 <= options.digits <= MOST_DIGITS:
+            raise ConfigError("--digits", f"{options.digits}: must be a whole number from 1 to {MOST_DIGITS}")
+        if options.slower or options.retime:
+            raise ConfigError("--digits", "must be absent with --slower and --retime, which give motions of their own")
     spec = _spec(options)
     with waiting():
         prepare_jax(options, quick=True)
@@ -118,9 +134,10 @@ def _check(options: argparse.Namespace) -> int:
             "--slower": options.slower,
             "--retime": options.retime,
             "--rate": options.json and options.rate,
+            "--digits": options.digits,
         }
         names = [name for name, value in outputs.items() if value]
-        check = checks.check_file(options.motion, spec, outputs=names, limits=options.limits)
+        check = checks.check_file(options.motion, spec, outputs=names, limits=options.limits, digits=options.digits)
         slower = check.slower() if options.slower and not check.feasible else None
     for line in check.plan.warnings:
         warn(line)

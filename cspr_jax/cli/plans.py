@@ -23,6 +23,7 @@ from cspr_jax.cli.command import (
 )
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.style.options import add_style
+from cspr_jax.runtime.exact_arithmetic import need_exact
 from cspr_jax.runtime.progress import waiting
 from cspr_jax.schema.setpoints import LARGEST_RATE, SETPOINT_FORMATS, USUAL_RATE
 from cspr_jax.store.files.publishing import check_writable
@@ -103,6 +104,12 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
         action="store_true",
         help="--mjcf: cables are springs, by axial_stiffness of the robot; FILE_control.csv has unstretched lengths",
     )
+    parser.add_argument(
+        "--certificate",
+        type=Path,
+        metavar="FILE.json",
+        help="write what is proved, feasible or not, so that `cspr verify` or a checker of your own can check it",
+    )
     parser.add_argument("--animate", type=Path, metavar="FILE", help="write a film: .gif, .mp4 or .html")
     parser.add_argument(
         "--speed", type=float, metavar="X", help="--animate: playback speed relative to real time (default 1)"
@@ -144,10 +151,11 @@ def check_files(options: argparse.Namespace) -> None:
     if options.elastic and options.mjcf is None:
         raise ConfigError("--elastic", "must be absent without --mjcf")
     _check_step(options)
+    _check_certificate(options)
     has_rows = options.json and options.rate is not None and options.setpoints is None
     if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
         raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
-    for path in (options.output, options.mjcf, options.animate, options.setpoints):
+    for path in (options.output, options.mjcf, options.animate, options.setpoints, options.certificate):
         check_writable(path)
 
 
@@ -161,6 +169,17 @@ def _check_setpoints(options: argparse.Namespace) -> None:
         raise ConfigError("--rate", f"{options.rate:g}: must be a number > 0, at most {LARGEST_RATE:g}, in Hz")
     if path in (options.output, options.mjcf and options.mjcf.with_name(f"{options.mjcf.stem}_control.csv")):
         raise ConfigError("--setpoints", f"{path}: must be another name: another file of the motion is written there")
+
+
+def _check_certificate(options: argparse.Namespace) -> None:
+    path = options.certificate
+    if path is None:
+        return
+    need_exact("--certificate")
+    if path.suffix != ".json":
+        raise ConfigError("--certificate", f"{path}: must end in .json")
+    if path in (options.output, options.setpoints):
+        raise ConfigError("--certificate", f"{path}: must be another name: another file of the motion is written there")
 
 
 def _check_step(options: argparse.Namespace) -> None:
@@ -229,7 +248,10 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def write_files(plan: Any, options: argparse.Namespace) -> None:
-    """Write the files that options name; if the motion is not feasible, only with --anyway."""
+    """Write the files that options name; if the motion is not feasible, all but its certificate only with --anyway."""
+    if options.certificate is not None:
+        with waiting():
+            plan.save_certificate(options.certificate)
     of_mjcf = {"elastic": options.elastic} | ({} if options.step is None else {"step": options.step})
     if options.setpoints is not None and plan.feasible:
         with waiting():

@@ -152,11 +152,26 @@ def _details(state: dict[str, Any]) -> list[str]:
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", type=Path, help="run directory, result or motion")
+    parser.add_argument("path", type=Path, help="run directory, result, motion, or certificate (.json)")
     add_json(parser)
 
 
+def _verify_certificate(options: argparse.Namespace) -> int:
+    from cspr_jax.api.certificates import verify_certificate
+
+    finding = verify_certificate(options.path)
+    if options.json:
+        print_json(finding.to_dict())
+    elif finding.holds:
+        print_line(f"{options.path}: the proof holds: {finding.message}")
+    else:
+        warn(f"{options.path}: the proof does not hold: {finding.message}")
+    return ExitCode.DONE if finding.holds else ExitCode.SELF_CHECK
+
+
 def _verify(options: argparse.Namespace) -> int:
+    if options.path.suffix == ".json":
+        return _verify_certificate(options)
     from cspr_jax.api.sweeps import verify
 
     report = verify(options.path)
@@ -197,7 +212,7 @@ COMMANDS = (
     Command("run", "compute a sweep file into an HDF5 result, whose path is the last line printed", _add_run, _run),
     Command("merge", "join maps: tiles of one map computed apart, or maps that differ in one axis", _add_merge, _merge),
     Command("status", "say how far a run has come, without changing it", _add_status, _status),
-    Command("verify", "reread and check all files of a run, or a result or motion file", _add_verify, _verify),
+    Command("verify", "check all files of a run, a result or motion file, or a certificate", _add_verify, _verify),
     Command(
         "volume",
         "print the volume of a map's workspace, and the error due to the grid",

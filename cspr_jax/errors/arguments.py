@@ -24,6 +24,7 @@ LARGEST_TIME = 1e12  # s; powers of times must not overflow
 LARGEST_POPULATION = 4096
 LARGEST_DIVISIONS = 128
 MAX_CABLES = 1000
+MOST_DIGITS = 15  # decimal digits of a floating-point number
 LARGEST_SAMPLES = 1_000_000
 UNBOUNDED = 10**9  # maximum of numbers that the function itself bounds more narrowly
 
@@ -156,6 +157,7 @@ AnyInteger = Annotated[int, Integer(-UNBOUNDED, UNBOUNDED)]
 TileRange = Annotated[tuple[int, int], Numbers("two integers, first and end", ((2,),))]
 
 NUMBER = Numbers("a number", infinite=True, nan=True)
+Digits = Annotated[int, Integer(1, MOST_DIGITS)]
 Positive = Annotated[float, Numbers("a finite number > 0", positive=True)]
 NotNegative = Annotated[float, Numbers("a finite number >= 0", minimum=0.0)]
 NotNegativeOrNone = Annotated[float | None, Choice(Numbers("a finite number >= 0", minimum=0.0), (None,))]

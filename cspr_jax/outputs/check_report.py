@@ -203,12 +203,14 @@ def check_table(plan: PlannedMotions):
         sign = "≥" if row["sense"] == "at least" else "≤"
         numbers = row.get("cables", [] if row["cable"] is None else [row["cable"]])
         cable = ", ".join(str(number + 1) for number in numbers) or "-"
-        values = [_digits(row["value"])]
-        values += [f"{sign} {_digits(row[name])}" if math.isfinite(row[name]) else "-" for name in ("bound", "allowed")]
+        values = [_digits(row["value"], plan.digits)]
+        sides = [row[name] for name in ("bound", "allowed")]
+        values += [f"{sign} {_digits(side, plan.digits)}" if math.isfinite(side) else "-" for side in sides]
         unit = row["unit"].replace("^2", "²")
-        table.add_row(*(cell(text) for text in (CRITERIA[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
+        time = f"{row['t']:.4f}" if plan.digits is None else _digits(row["t"], plan.digits)
+        table.add_row(*(cell(text) for text in (CRITERIA[flag][1], *values, unit, cable, time)))
     return table
 
 
-def _digits(value: float) -> str:
-    return f"{value:.5g}" if math.isfinite(value) else "-"
+def _digits(value: float, digits: int | None) -> str:
+    return f"{value:.{digits or 5}g}" if math.isfinite(value) else "-"

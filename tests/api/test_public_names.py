@@ -29,7 +29,7 @@ FUNCTIONS = {
     "run": ("run", "compute_sweep"),
     "merge": ("merge",),
     "status": ("status",),
-    "verify": ("verify",),
+    "verify": ("verify", "verify_certificate"),
     "volume": ("workspace_volume",),
     "design": ("design",),
     "plan": ("plan",),
@@ -83,9 +83,9 @@ def test_every_command_has_its_function():
         own = NAMES | {
             "run": {"output": "directory"},
             "merge": {"output": "directory"},
-            "plan": {"output": "path", "mjcf": "path", "animate": "path", "setpoints": "path"},
+            "plan": dict.fromkeys(("output", "mjcf", "animate", "setpoints", "certificate"), "path"),
             "check": {
-                **{"output": "path", "mjcf": "path", "animate": "path", "setpoints": "path"},
+                **dict.fromkeys(("output", "mjcf", "animate", "setpoints", "certificate"), "path"),
                 **{"motion": "times", "slower": "slower"},
             },
         }.get(name, {})

@@ -97,6 +97,8 @@ def test_a_class_name_is_bound_once():
     """So that a name means one thing in the whole package."""
     places = collections.defaultdict(list)
     for name, source in SOURCES.items():
+        if name.startswith("certificate_checker/"):  # a program apart, whose words are those of the format
+            continue
         for node in ast.parse(source).body:
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(name)
