@@ -82,7 +82,8 @@ def _gaps(case: Fields) -> Iterator[str]:
     for k, (one, two) in enumerate(pairwise(case["pieces"])):
         try:
             first, second = (State(case["robot"], piece, piece, two["start"], fmpq(0)) for piece in (one, two))
-            gaps = [[a - b] for a, b in zip(chain(*first.rotation), chain(*second.rotation), strict=True)]
+            turns = [a - b for a, b in zip(chain(*first.rotation), chain(*second.rotation), strict=True)]
+            gaps = [[entry] for turn in turns for entry in (turn, turn.derivative() * SAME_TIME)]
             gaps += [plus(first.position, second.position, -1)]
             gaps += [[entry * SAME_TIME for entry in plus(first.velocity, second.velocity, -1)]]
             if not all(dot(gap, gap)[0] <= SAME**2 for gap in gaps):

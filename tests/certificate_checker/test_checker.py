@@ -453,6 +453,23 @@ def test_jumps_of_rotation(turn, meets):
     assert finding.holds or turn == "-1" or not meets
 
 
+@pytest.mark.parametrize(("rate", "meets"), [("0", True), ("2e-7", True), ("1e-6", False), ("0.1", False)])
+def test_jumps_of_angular_velocity(rate, meets):
+    """A platform does not begin to turn from one time to the next."""
+    content, _, _ = hexapod()
+    content["limits"] = {}
+    piece = content["motion"]["pieces"][0]
+    still = [["poly", [step[1][0]]] for step in piece["program"][:3]] + [["poly", [c]] for c in ("1", "0", "0", "0")]
+    turning = [*still[:6], ["poly", ["0", rate]]]
+    content["motion"]["pieces"] = [
+        piece | {"end": "1/2", "program": still},
+        piece | {"start": "1/2", "program": turning},
+    ]
+    bounds = {f"slack_cable:{i}": -0.0 for i in range(6)} | {"singular": 0, "above_spools": 0}
+    finding = check(feasible(content, bounds, cut(content["motion"]["pieces"], 2)) | {"sha256": ""})
+    assert ("do not meet" in finding.message) is not meets
+
+
 def test_motions_that_are_not_defined_are_not_infeasible():
     """A step that is not defined at another time than that of the failure makes the motion none."""
     content = without_proof(simple(floor=1.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Sequence
 from fractions import Fraction
@@ -27,7 +28,7 @@ from cspr_jax.verification.certificates.statement import (
 from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.exact.decisions import BITS
 from cspr_jax.verification.exact.series import SeriesPieces, precision
-from cspr_jax.verification.exact.slacks import slack_functions
+from cspr_jax.verification.exact.slacks import SlackFunction, slack_functions
 from cspr_jax.verification.proved_answers import MotionProof
 
 FORMAT, VERSION = "cspr-certificate", 1
@@ -48,6 +49,8 @@ def certificate(
     """
     if any(proof.verdict == Verdict.UNDECIDED for proof in proofs):
         raise NoCertificateError("the motion is neither proved nor refuted")
+    if len({len(proof.criteria) for proof in proofs}) > 1:
+        raise NoCertificateError("only some segments have feeds")
     around = scene or default_scene(problem.robot)
     pieces = _chained(motions)
     speeds = _speeds(motions, feeds)
@@ -63,7 +66,13 @@ def certificate(
     content |= {} if bodies is None else {"scene": bodies}
     with precision(BITS):
         each = SeriesPieces(pieces)
-        content |= _answer(problem, around, each, proofs, [motion[-1].end for motion in motions])
+        functions = slack_functions(problem, around, feeds=None if speeds is None else np.array(speeds))
+        if all(proof.is_feasible for proof in proofs):
+            content |= _feasible(problem, around, each, proofs)
+        else:
+            starts = itertools.accumulate((motion[-1].end for motion in motions[:-1]), initial=Fraction(0))
+            cases = list(zip(proofs, map(float, starts), strict=True))
+            content |= {"verdict": "infeasible", "failures": _failures(problem, around, each, cases, functions)}
     return content | {"sha256": digest(content)}
 
 
@@ -73,43 +82,35 @@ def digest(content: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode("ascii")).hexdigest()
 
 
-def _answer(
-    problem: Problem, scene: Scene, pieces: SeriesPieces, proofs: Sequence[MotionProof], durations: Sequence[Any]
-) -> dict[str, Any]:
-    # The part of a certificate that is proved: blocks, or failures.
-    if all(proof.is_feasible for proof in proofs):
-        rows = proofs[0].criteria
-        names = criterion_names(rows)
-        largest = float(problem.robot.mass * problem.robot.gravity) + 1.0
-        bounds = stated_bounds(rows, np.min([proof.proof.low for proof in proofs], axis=0), largest)
-        return {
-            "verdict": "feasible",
-            "bounds": {name: _decimal(bound) for name, bound in zip(names, bounds, strict=True)},
-            "blocks": witnessed_blocks(problem, scene, pieces, rows, bounds),
-        }
-    return {"verdict": "infeasible", "failures": _failures(problem, scene, pieces, proofs, durations)}
+def _feasible(problem: Problem, scene: Scene, pieces: SeriesPieces, proofs: Sequence[MotionProof]) -> dict[str, Any]:
+    # Bounds and blocks.
+    rows = proofs[0].criteria
+    largest = float(problem.robot.mass * problem.robot.gravity) + 1.0
+    bounds = stated_bounds(rows, np.min([proof.proof.low for proof in proofs], axis=0), largest)
+    return {
+        "verdict": "feasible",
+        "bounds": {name: _decimal(bound) for name, bound in zip(criterion_names(rows), bounds, strict=True)},
+        "blocks": witnessed_blocks(problem, scene, pieces, rows, bounds),
+    }
 
 
 def _failures(
-    problem: Problem, scene: Scene, pieces: SeriesPieces, proofs: Sequence[MotionProof], durations: Sequence[Fraction]
+    problem: Problem,
+    scene: Scene,
+    pieces: SeriesPieces,
+    cases: Sequence[tuple[MotionProof, float]],
+    functions: Sequence[SlackFunction | None],
 ) -> list[dict[str, Any]]:
-    # Failures that can be shown at single times, which need not be all of them.
-    rows, functions = proofs[0].criteria, slack_functions(problem, scene)
-    names, failures, left, start = (
-        criterion_names(rows),
-        list[dict[str, Any]](),
-        list[NoCertificateError](),
-        Fraction(0),
-    )
-    for proof, duration in zip(proofs, durations, strict=True):
+    # Failures that can be shown at single times, which need not be all of them; each proof has the time of its start.
+    failures, left = list[dict[str, Any]](), list[NoCertificateError]()
+    for proof, start in cases:
+        names = criterion_names(proof.criteria)
         for k in np.flatnonzero(proof.broken).tolist():
-            near = float(start) + float(proof.proof.when[k])
-            named = NamedSlack(rows[k], names[k], functions[k] if k < len(functions) else None)
+            slack = NamedSlack(proof.criteria[k], names[k], functions[k] if k < len(functions) else None)
             try:
-                failures.append(failure(problem, scene, pieces, named, near))
+                failures.append(failure(problem, scene, pieces, slack, start + float(proof.proof.when[k])))
             except NoCertificateError as error:
                 left.append(error)
-        start += duration
     if not failures:
         raise left[0]
     return failures

@@ -40,7 +40,7 @@ FACETS = 8  # so many facets of redundant cables cost as much as all else
 def decided(problem: Problem, motion: Any, case: MotionProof, scene: Scene | None = None) -> MotionProof:
     """The proof with its open criteria decided, as far as formulas and the largest number of blocks allow."""
     level = levels(case.criteria)
-    functions = slack_functions(problem, scene, case.parts)
+    functions = slack_functions(problem, scene, case.parts, case.feeds)
     is_open = ~((case.proof.low > level) | case.broken)[: len(functions)]
     with precision(BITS):
         formulas = motion.formulas()

@@ -41,7 +41,7 @@ def with_extremes(problem: Problem, motion: Any, case: MotionProof, scene: Scene
     low, high, when = (side.copy() for side in (case.proof.low, case.proof.high, case.proof.when))
     with precision(BITS):
         pieces = SeriesPieces(motion.formulas())
-        for k, function in enumerate(slack_functions(problem, scene, case.parts)):
+        for k, function in enumerate(slack_functions(problem, scene, case.parts, case.feeds)):
             if function is None:
                 continue
             offset = case.criteria[k].allowed * (1.0 if case.criteria[k].sense == "least" else -1.0)

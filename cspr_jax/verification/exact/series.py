@@ -56,6 +56,7 @@ class SeriesState(NamedTuple):
         rotation: None for a point mass.
         angular_velocity: fixed axes, rad/s.
         angular_acceleration: rad/s^2.
+        piece: index of the piece of the motion.
     """
 
     time: Any
@@ -65,6 +66,7 @@ class SeriesState(NamedTuple):
     rotation: Any = None
     angular_velocity: Any = None
     angular_acceleration: Any = None
+    piece: int = 0
 
 
 class SeriesPiece:
@@ -72,10 +74,12 @@ class SeriesPiece:
 
     Args:
         piece: with its formulas.
+        index: of the piece in its motion.
     """
 
-    def __init__(self, piece: MotionPiece) -> None:
+    def __init__(self, piece: MotionPiece, index: int = 0) -> None:
         """Find the program of the piece."""
+        self.index = index
         self.formula, self.start, self.end = piece, piece.start, piece.end
         position, quaternion = piece.components
         self.program: Program = program([*position, *(quaternion or [])])
@@ -90,8 +94,8 @@ class SeriesPiece:
         position, velocity = outputs[:3], [x.derivative() for x in outputs[:3]]
         acceleration = [x.derivative() for x in velocity]
         if not self._is_body:
-            return SeriesState(u, position, velocity, acceleration)
-        return SeriesState(u, position, velocity, acceleration, *turning(outputs[3:]))
+            return SeriesState(u, position, velocity, acceleration, piece=self.index)
+        return SeriesState(u, position, velocity, acceleration, *turning(outputs[3:]), self.index)
 
     def _steps(self) -> list[tuple[str, Sequence[Any]]]:
         # Coefficients become balls once for each precision.
@@ -121,7 +125,7 @@ class SeriesPieces:
     def __getitem__(self, index: int) -> SeriesPiece:
         """The piece of an index."""
         if index not in self._pieces:
-            self._pieces[index] = SeriesPiece(self.formulas[index])
+            self._pieces[index] = SeriesPiece(self.formulas[index], index)
         return self._pieces[index]
 
     def at(self, time: Fraction) -> SeriesPiece:

@@ -16,6 +16,7 @@ import numpy as np
 
 from cspr_jax.motion.limits import limits_set, motor_limits_set
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import bodies_of, default_scene, platform_corners
@@ -36,9 +37,12 @@ SlackFunction = Callable[[Kinematics], list[Component]]
 
 
 def slack_functions(
-    problem: Problem, scene: Scene | None = None, parts: CriterionParts = ALL
+    problem: Problem,
+    scene: Scene | None = None,
+    parts: CriterionParts = ALL,
+    feeds: Float[np.ndarray, "pieces"] | None = None,
 ) -> list[SlackFunction | None]:
-    """Slacks of all criteria; None for those without formulas."""
+    """Slacks of all criteria, the last one that of the feeds of pieces; None for those without formulas."""
     robot, limits = problem.robot, problem.limits
     functions: list[SlackFunction | None] = []
     if parts.usual:
@@ -52,7 +56,14 @@ def slack_functions(
         is_regular, is_below = pose_conditions(robot)
         functions += [_regular(robot)] if is_regular else []
         functions += [_below(robot)] if is_below else []
-    return functions + (list(_of_contacts(robot, limits, scene)) if parts.contacts else [])
+    functions += list(_of_contacts(robot, limits, scene)) if parts.contacts else []
+    return functions if feeds is None else [*functions, partial(_of_feeds, feeds)]
+
+
+def _of_feeds(feeds: Float[np.ndarray, "pieces"], at: Kinematics) -> list[Component]:
+    # A piece without a feed has no component.
+    feed = float(feeds[at.state.piece])
+    return [Component(flint.arb(feed) - _norm(at.state.velocity))] if np.isfinite(feed) else []
 
 
 def _of_tensions(robot: AnyRobot, limits: Any) -> list[SlackFunction | None]:
