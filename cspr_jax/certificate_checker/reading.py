@@ -30,7 +30,7 @@ FLAGS = {  # of the limits of cables
     "motor_speed_max": "motor_too_fast",
     "motor_torque_max": "motor_over_torque",
     "motor_power_max": "motor_over_power",
-    "motor_load_max": "motor_overloaded",
+    "motor_load_max": "motor_over_load",
 }
 MOTORS, OTHERS = list(FLAGS)[5:], ["speed_max?", "acceleration_max?", "touched?"]
 LIMITS = {**{f"{name}?": "nonnegative n" for name in FLAGS}, **dict.fromkeys(OTHERS, "nonnegative"), "floor?": "number"}

@@ -115,16 +115,21 @@ def _of_pieces(pieces: MotionPieces, interpolation: str | None, ends: str | None
     for key, value in (("interpolation", interpolation), ("ends", ends)):
         if value is not None:
             raise InputError(key, value, "absent for a motion of polynomial pieces")
-    quaternion = pieces.quaternion
+    position, quaternion = (_with_rates(table) for table in (pieces.position, pieces.quaternion))
     if quaternion is not None:
         dots = (quaternion[1:, 0] * quaternion[:-1, -1]).sum(axis=1)
         quaternion = quaternion * np.cumprod(np.append(1.0, np.where(dots < 0.0, -1.0, 1.0)))[:, None, None]
     width = np.diff(pieces.knots)[:, None]
-    for name, table in (("position", pieces.position), ("quaternion", quaternion)):
+    for name, table in (("position", position), ("quaternion", quaternion)):
         if table is not None:
             _check_joins(name, table, width, pieces.knots - pieces.knots[0])
     since = as_float64(pieces.knots - pieces.knots[0])
-    return Spline(since, as_float64(pieces.position), None if quaternion is None else as_float64(quaternion))
+    return Spline(since, as_float64(position), None if quaternion is None else as_float64(quaternion))
+
+
+def _with_rates(table: np.ndarray | None) -> np.ndarray | None:
+    # Pieces of degree 1 in place of constants, which have no derivatives.
+    return table if table is None or table.shape[1] > 1 else np.repeat(table, 2, axis=1)
 
 
 def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndarray) -> None:

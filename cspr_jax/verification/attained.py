@@ -39,14 +39,15 @@ def with_attained(
 
     Margins of proofs are attained ones, too.
     """
-    proofs = np.array(answers.proof)
+    proofs, before = np.array(answers.proof), [Verdict.FEASIBLE] * len(motions)
     for i, motion in enumerate(motions):
         is_known = proofs[i] is not None and not (not proofs[i].parts.usual and not proofs[i].verdict)
         if not is_known and not answers.feasible[i]:
             proofs[i] = proof_of(problem, motion, scene)
         if proofs[i] is not None:
+            before[i] = proofs[i].verdict
             proofs[i] = attained(problem, motion, proofs[i], scene)
-    answers = _with_verdicts(dataclasses.replace(answers, proof=proofs))
+    answers = _with_verdicts(dataclasses.replace(answers, proof=proofs), before)
     if answers.margin_unit != "N" or not all(proofs):
         return answers
     moves = np.isfinite(answers.duration)
@@ -56,26 +57,24 @@ def with_attained(
     return dataclasses.replace(answers, **margins)
 
 
-def _with_verdicts(answers: AnyAnswers) -> AnyAnswers:
-    # Take the verdicts of full proofs where families, or bounds, leave them open; not where robots are uncertain.
-    rows = [
-        i
-        for i, proof in enumerate(answers.proof)
-        if proof is not None
-        and answers.verdict[i] & ~FEWER == Verdict.UNDECIDED.value
-        and np.isnan(answers.tolerated[i])
-    ]
+def _with_verdicts(answers: AnyAnswers, before: list[Verdict]) -> AnyAnswers:
+    # Take the verdicts of proofs where families, or bounds, leave them open or err; not where robots are uncertain.
     verdict, arcs = answers.verdict.copy(), answers.arcs.copy()
-    for i in rows:
-        verdict[i] = (answers.verdict[i] & FEWER) | FLAGS(answers.proof[i].verdict.value)
-        arcs[i] = answers.tried_arcs[i] if answers.proof[i].is_feasible else arcs[i]
+    for i, proof in enumerate(answers.proof):
+        reasons = Verdict(int(verdict[i] & ~FEWER))
+        if proof is None or not np.isnan(answers.tolerated[i]) or reasons not in (Verdict.UNDECIDED, before[i]):
+            continue
+        verdict[i] = (verdict[i] & FEWER) | FLAGS(proof.verdict.value)
+        arcs[i] = answers.tried_arcs[i] if reasons and proof.is_feasible else arcs[i]
     return dataclasses.replace(answers, verdict=verdict, arcs=arcs)
 
 
 def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None) -> MotionProof:
     """The proof with smallest slacks, and times, that the motion attains; open criteria are decided exactly."""
     case = _sampled(problem, motion, case, scene)
-    if case.verdict != Verdict.UNDECIDED or not (has_exact() and isinstance(motion, HasFormulas)):
+    if not (has_exact() and isinstance(motion, HasFormulas) and np.isfinite(float(motion.duration()))):
+        return case
+    if not case.doubtful.any():
         return case
     from cspr_jax.verification.exact.decisions import decided  # few motions are open
 

@@ -16,7 +16,7 @@ from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.linear.frames import Frame
-from cspr_jax.numerics.shapes import Float
+from cspr_jax.numerics.shapes import Bool, Float
 from cspr_jax.robots.bounds.state_bounds import StateBounds, at_rest
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.model.point_mass import spool_radius
@@ -28,6 +28,8 @@ from cspr_jax.verification.criteria import ALL, AT_TIMES, Criterion, CriterionPa
 from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
+# Slacks of proofs by bounds are right to this fraction of limit and scale; their rounding is some 1e-13.
+ROUNDED = 1e-11
 # Number of intervals between samples of a motion without bounds.
 SAMPLES = 2000
 ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
@@ -66,6 +68,18 @@ class MotionProof(NamedTuple):
         return (self.proof.high < levels(self.criteria)) | np.array(
             [len(intervals) > 0 for intervals in self.proof.failing], bool
         )
+
+    @property
+    def rounding(self) -> Float[np.ndarray, "n_criteria"]:
+        """Distances of slacks from their levels within which rounding may have put them on the other side."""
+        return ROUNDED * (np.abs([row.allowed for row in self.criteria]) + self.scales)
+
+    @property
+    def doubtful(self) -> Bool[np.ndarray, "n_criteria"]:
+        """Tell which criteria are neither met nor broken, or within rounding of that."""
+        level, broken = levels(self.criteria), self.broken
+        near = np.where(broken, self.proof.high > level - self.rounding, self.proof.low < level + self.rounding)
+        return near | ~((self.proof.low > level) | broken)
 
     @property
     def verdict(self) -> Verdict:

@@ -176,3 +176,10 @@ def test_windows_that_feel_their_ends_are_refused(tmp_path, monkeypatch):
     np.savetxt(path, rows, delimiter=",", header="t,x,y,z", comments="")
     with pytest.raises(InputError, match="is felt from window to window"):
         list(window_splines(text.windows(path, 20), interpolation="quintic"))
+
+
+def test_pieces_of_degree_0_stay_in_place():
+    spline = spline_of(pieces_of(BPoly(np.full((1, 2, 3), 1.5), [0.0, 1.0, 2.0])))
+    _, found = states(spline)
+    np.testing.assert_allclose(found.position, 1.5)
+    np.testing.assert_allclose(found.velocity, 0.0)

@@ -83,10 +83,7 @@ def test_many_motions(make):
         assert wrong_values(*next(cases.feasible_cases(make, 1000 * seed)), 12) == [], seed
 
 
-# The values have these digits, and are attained at the times given; the times themselves are known to half as many,
-# where the extreme is flat, although texts show all of them.
 @pytest.mark.thorough
-@pytest.mark.xfail(reason="times of extremes are given to about half of the digits")
 def test_times_to_twelve_digits():
     case, robot, pieces = next(cases.feasible_cases(cases.point_mass_case, 0))
     for quantity, _, row, (extreme, _) in rows_of(case, robot, pieces, 12):

@@ -198,19 +198,12 @@ def test_many_motions_of_families(make):
     assert faults(make, 100, 10, shares) == ([], 20 * len(shares))
 
 
-# Bug of the package: along paths, whose pieces last a thousandth of a second and whose accelerations jump by some 1e-9
-# of themselves, the proof in float64 is wrong by up to 3e-14: it calls limits kept that are broken, and broken ones
-# that are kept. Exact decisions are not asked, since nothing is undecided.
 @pytest.mark.soak
-@pytest.mark.xfail(reason="the proof in float64 loses digits at joints of short pieces")
 def test_limits_nearest_to_extremes_of_paths():
     assert faults(path, 100, 10, SHARES[6:]) == ([], 40)
 
 
-# Bug of the package: where a quantity is constant, as the speed on a circle, limits nearer than some 1e-9 above it are
-# "undecided".
 @pytest.mark.thorough
-@pytest.mark.xfail(reason="a constant speed just below a limit stays undecided")
 def test_constant_speed_on_a_circle():
     ellipse = {"centre": [0.0, 0.0, 1.4], "radius": 0.1, "frequency": 2.0}
     keys = {"ellipse": ellipse, "turns": 1.0, "pose": [{}, {}], "schema": 1, "family": "ellipse", "robot": "prototype"}

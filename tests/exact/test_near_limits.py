@@ -102,10 +102,7 @@ def test_many_point_masses(make):
     assert (faults, number) == ([], 94 * count)
 
 
-# Bug of the package: the proof in float64 does not bound the rounding of depths, and refuses floors that are kept by
-# less than 2e-16.
 @THOROUGH
-@pytest.mark.xfail(reason="floors that are kept by the last digit are refused")
 def test_floors_at_the_nearest_numbers():
     faults, _ = faults_of_point_masses(cases.planar_case, 1, 4, (), ("depth",), nearest_floors=True)
     assert faults == []

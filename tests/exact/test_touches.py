@@ -212,9 +212,7 @@ def test_a_length_is_reached():
     check_touched(guide(), vertical([1.0, inner, 5.0, inner, 1.0], 8.0), "cable_length_max", limit, "cable_too_long")
 
 
-# Bug of the package: a limit that is reached exactly at an end of a motion, and changing there, is "undecided".
 @THOROUGH
-@pytest.mark.xfail(reason="a limit that is reached exactly at an end of a motion stays undecided")
 @pytest.mark.parametrize("reverse", [False, True], ids=["start", "end"])
 def test_a_speed_is_reached_at_an_end(robot, reverse):
     """By (b1 - b0) 2 / width."""
@@ -224,7 +222,6 @@ def test_a_speed_is_reached_at_an_end(robot, reverse):
 
 
 @THOROUGH
-@pytest.mark.xfail(reason="a limit that is reached exactly at an end of a motion stays undecided")
 def test_a_tension_is_reached_at_the_start():
     """Where z'' = 6 (b2 - 2 b1 + b0) / width^2 = gravity - tension."""
     limit = 10.5625  # its allowance is a multiple of three of its last digits

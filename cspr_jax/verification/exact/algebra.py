@@ -10,7 +10,7 @@ touching is told from crossing.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -30,6 +30,7 @@ from cspr_jax.verification.exact.facets import determinant
 from cspr_jax.verification.exact.series import BINARY, cross, dot, run, times, turning
 
 Vector = list[Any]
+LARGEST_ANGLE = 1  # rad; half of a larger one may come near the pole of its tangent
 ROOT_BITS = 400  # precision of the ends of intervals, and of roots that are compared with them
 
 
@@ -121,11 +122,13 @@ class AlgebraicPiece(NamedTuple):
         outputs: position, and quaternion of a body.
         variable: function from the time since the start of the piece to a ball of the variable, which it grows with.
         time: the inverse.
+        rate: how fast the angle grows whose half has the variable as tangent, rad/s; 0: the variable is the time.
     """
 
     outputs: list[RationalFunction]
     variable: Callable[[Fraction], flint.arb]
     time: Callable[[flint.arb], flint.arb]
+    rate: Fraction = Fraction(0)
 
 
 def algebraic_piece(piece: MotionPiece, middle: Fraction) -> AlgebraicPiece:
@@ -166,7 +169,7 @@ def algebraic_piece(piece: MotionPiece, middle: Fraction) -> AlgebraicPiece:
     def when(value: flint.arb) -> flint.arb:
         return (2 * value.atan() + half_turns - _ball(start)) / _ball(rate)
 
-    return AlgebraicPiece([values[i] for i in outputs], variable, when)
+    return AlgebraicPiece([values[i] for i in outputs], variable, when, rate)
 
 
 def _angle(steps: Any) -> tuple[Fraction, Fraction] | None:
@@ -295,43 +298,61 @@ class Sign(NamedTuple):
 def decided_sign(problem: Problem, row: Criterion, piece: MotionPiece, interval: tuple[Fraction, Fraction]) -> Sign:
     """Sign of the slack of a criterion within an interval of time since the start of a piece; when it fails, in s."""
     first, last = interval
+    middle = (first + last) / 2
     try:
-        algebraic = algebraic_piece(piece, (first + last) / 2)
+        algebraic = algebraic_piece(piece, middle)
+        if abs(algebraic.rate) * (last - first) > LARGEST_ANGLE:
+            halves = (decided_sign(problem, row, piece, half) for half in ((first, middle), (middle, last)))
+            return next((sign for sign in halves if not sign.is_met), Sign(True))
         functions, is_strict = sign_function(problem, row, algebraic)
     except NotAlgebraicError:
         return Sign(None)
     ends = sorted((algebraic.variable(first), algebraic.variable(last)), key=lambda x: float(x.mid()))
-    signs = [sign_within(function, *ends, is_strict=is_strict) for function in functions]
+    exact_ends = () if algebraic.rate else (rational(first), rational(last))
+    signs = [sign_within(each, *ends, is_strict=is_strict, exact_ends=exact_ends) for each in functions]
     failed = next((sign for sign in signs if sign.is_met is False), None)
     if failed is not None:
         return Sign(False, algebraic.time(failed.time))
     return Sign(True if all(sign.is_met for sign in signs) else None)
 
 
-def sign_within(function: RationalFunction, first: flint.arb, last: flint.arb, *, is_strict: bool) -> Sign:
-    """Sign of a function between two values of its variable."""
+def sign_within(
+    function: RationalFunction,
+    first: flint.arb,
+    last: flint.arb,
+    *,
+    is_strict: bool,
+    exact_ends: Sequence[flint.fmpq] = (),
+) -> Sign:
+    """Sign of a function between two values of its variable, which may be known exactly."""
     polynomial = function.sign_polynomial
     if polynomial.is_zero():
         return Sign(not is_strict, first)
-    roots = []
-    for factor, _ in polynomial.numer().factor_squarefree()[1]:
-        for root in _real_roots(factor):
-            if root >= first and root <= last:
-                roots.append(root)
-            elif not (root < first or root > last):
-                return Sign(None)  # at an end, within the precision
-    roots.sort(key=lambda root: root.mid())
+    rest, at_ends = polynomial, []
+    for end in exact_ends:
+        factor = VARIABLE - end
+        while rest(end) == 0:
+            rest, at_ends = rest // factor, [flint.arb(end)]
+    if is_strict and at_ends:
+        return Sign(False, at_ends[0])
+    roots = [root for factor, _ in rest.numer().factor_squarefree()[1] for root in _real_roots(factor)]
+    if any(not (root >= first or root < first) or not (root <= last or root > last) for root in roots):
+        return Sign(None)  # at an end, within the precision
+    roots = sorted((root for root in roots if root >= first and root <= last), key=lambda root: root.mid())
     if is_strict and roots:
         return Sign(False, roots[0])
     edges = [first, *roots, last]
-    for before, after in itertools.pairwise(edges):
-        middle = ((before + after) / 2).mid()
-        value: Any = flint.arb_poly(polynomial)(middle)
-        if not (value > 0 or value < 0):
-            return Sign(None)
-        if value < 0:
-            return Sign(False, middle)
-    return Sign(True)
+    middles = [((before + after) / 2).mid() for before, after in itertools.pairwise(edges)]
+    return _of_samples(polynomial, middles)
+
+
+def _of_samples(polynomial: flint.fmpq_poly, values: Sequence[flint.arb]) -> Sign:
+    # Sign of a polynomial from its signs between roots.
+    signs: list[Any] = [flint.arb_poly(polynomial)(value) for value in values]
+    failed = next((value for value, sign in zip(values, signs, strict=True) if sign < 0), None)
+    if failed is not None:
+        return Sign(False, failed)
+    return Sign(True if all(sign > 0 for sign in signs) else None)
 
 
 def _real_roots(factor: Any) -> list[flint.arb]:

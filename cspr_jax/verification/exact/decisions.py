@@ -11,13 +11,14 @@ import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import flint
 import numpy as np
 
 from cspr_jax.motion.formulas import MotionPiece
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
@@ -33,85 +34,120 @@ from cspr_jax.verification.time_proof import TimeProof
 
 BITS = 256  # precision of balls, of which bounds of slacks lose some dozens
 MET = 1e-30  # a slack nearer to its level than this, over its scale, is left to algebra
+FEW_BLOCKS = 400  # number of blocks before algebra is asked
 MOST_BLOCKS = 20_000  # largest number of blocks for one criterion, some ten seconds
 FACETS = 8  # so many facets of redundant cables cost as much as all else
 
 
 def decided(problem: Problem, motion: Any, case: MotionProof, scene: Scene | None = None) -> MotionProof:
-    """The proof with its open criteria decided, as far as formulas and the largest number of blocks allow."""
-    level = levels(case.criteria)
+    """The proof with criteria that are open, or within rounding of their levels, decided as far as formulas allow."""
     functions = slack_functions(problem, scene, case.parts, case.feeds)
-    is_open = ~((case.proof.low > level) | case.broken)[: len(functions)]
     with precision(BITS):
-        formulas = motion.formulas()
-        pieces = SeriesPieces(formulas)
-        for k in np.flatnonzero(is_open).tolist():
+        pieces = SeriesPieces(motion.formulas())
+        for k in np.flatnonzero(case.doubtful[: len(functions)]).tolist():
             function = functions[k]
-            if function is None:
-                continue
-            answer = sign(problem, function, pieces, case.proof.open[k], float(level[k]), MET * float(case.scales[k]))
-            proof = _with(case.proof, k, float(level[k]), answer)
-            if len(proof.open[k]):
-                proof = _met_exactly(problem, case.criteria[k], formulas, proof, k, float(level[k]))
-            case = case._replace(proof=proof)
+            if function is not None:
+                doubt = Doubt(k, float(levels(case.criteria)[k]), MET * float(case.scales[k]), _intervals(case, k))
+                case = case._replace(proof=_decided(problem, case, doubt, function, pieces))
     return case
 
 
-def _met_exactly(
-    problem: Problem, row: Criterion, formulas: list[MotionPiece], proof: TimeProof, k: int, level: float
+class Doubt(NamedTuple):
+    """A criterion to be decided.
+
+    Fields:
+        column: index of the criterion.
+        level: slack above which it is met.
+        met: distance from the level within which algebra decides.
+        intervals: (m, 2) times at which it is not decided, s.
+    """
+
+    column: int
+    level: float
+    met: float
+    intervals: np.ndarray
+
+
+def _intervals(case: MotionProof, k: int) -> Float[np.ndarray, "m 2"]:
+    # Times at which a criterion may be met or broken: open ones, and blocks with slacks within rounding of the level.
+    near, level = case.proof.near, float(levels(case.criteria)[k])
+    if near is None:
+        return case.proof.open[k]
+    chosen = near.slacks.low[:, k] < level + case.rounding[k]
+    blocks = np.stack([near.start[chosen], near.end[chosen]], axis=1)
+    return united(np.concatenate([case.proof.open[k], case.proof.failing[k], blocks]))
+
+
+def _decided(
+    problem: Problem, case: MotionProof, doubt: Doubt, function: SlackFunction, pieces: SeriesPieces
 ) -> TimeProof:
+    # A few blocks, then algebra, then as many blocks as are allowed.
+    for count in (FEW_BLOCKS, largest_count(problem.robot)):
+        answer = sign(problem, function, pieces, doubt, count)
+        if answer.high < doubt.level or answer.low > doubt.level:
+            return _with(case.proof, doubt, answer)
+        if count == FEW_BLOCKS:
+            proof = _met_exactly(problem, case.criteria[doubt.column], pieces.formulas, case.proof, doubt)
+            if proof is not None:
+                return proof
+    return case.proof
+
+
+def _met_exactly(
+    problem: Problem, row: Criterion, formulas: Sequence[MotionPiece], proof: TimeProof, doubt: Doubt
+) -> TimeProof | None:
     # The proof with one criterion decided by algebra: touched limits are met, cables that just lose tension are not.
+    k, low, high, times = doubt.column, proof.low.copy(), proof.high.copy(), proof.when.copy()
     with precision(ROOT_BITS):
-        for index, first, last in _overlaps(formulas, proof.open[k]):
+        for index, first, last in _overlaps(formulas, doubt.intervals):
             piece = formulas[index]
             answer = decided_sign(problem, row, piece, (first - piece.start, last - piece.start))
             if answer.is_met is None:
-                return proof
+                return None
             if not answer.is_met:
-                when = float(answer.time + ball(piece.start))
-                failing = [*proof.failing[:k], np.array([[when, when]]), *proof.failing[k + 1 :]]
-                high, times = proof.high.copy(), proof.when.copy()
-                high[k], times[k] = min(high[k], level), when
+                times[k] = float(answer.time + ball(piece.start))
+                failing = [*proof.failing[:k], np.array([[times[k], times[k]]]), *proof.failing[k + 1 :]]
+                high[k] = min(high[k], doubt.level)
                 return dataclasses.replace(proof, high=high, when=times, failing=failing, open=_without(proof.open, k))
-    low = proof.low.copy()
-    low[k] = np.nextafter(level, np.inf)
-    return dataclasses.replace(proof, low=low, open=_without(proof.open, k))
+    low[k] = np.nextafter(doubt.level, np.inf)
+    return _met(dataclasses.replace(proof, low=low), doubt)
 
 
 def _without(intervals: list[np.ndarray], k: int) -> list[np.ndarray]:
     return [*intervals[:k], np.empty((0, 2)), *intervals[k + 1 :]]
 
 
-def _with(proof: TimeProof, k: int, level: float, answer: Minimum) -> TimeProof:
+def _met(proof: TimeProof, doubt: Doubt) -> TimeProof:
+    # The proof without the times at which a criterion that is met seemed open or broken.
+    high = proof.high.copy()
+    high[doubt.column] = max(high[doubt.column], doubt.level)
+    sides: dict[str, Any] = {
+        "failing": _without(proof.failing, doubt.column),
+        "open": _without(proof.open, doubt.column),
+    }
+    return dataclasses.replace(proof, high=high, **sides)
+
+
+def _with(proof: TimeProof, doubt: Doubt, answer: Minimum) -> TimeProof:
     # The proof with what is known of one criterion. The number next to the level stands for one too close for floats.
-    low, high, when, left = proof.low.copy(), proof.high.copy(), proof.when.copy(), proof.open
+    k, level = doubt.column, doubt.level
+    low, high, when = proof.low.copy(), proof.high.copy(), proof.when.copy()
     if answer.high < level:
         high[k], when[k] = min(float(answer.value), np.nextafter(level, -np.inf)), float(answer.when)
-        left = _without(left, k)
-    elif answer.low > level:
-        bounds = [float(answer.low)] if proof.near is None else [float(answer.low), *proof.near.slacks.low[:, k]]
-        low[k] = max(min((bound for bound in bounds if bound > level), default=level), np.nextafter(level, np.inf))
-        left = _without(left, k)
-    return dataclasses.replace(proof, low=low, high=high, when=when, open=left)
+        return dataclasses.replace(proof, high=high, when=when, open=_without(proof.open, k))
+    bounds = [float(answer.low)] if proof.near is None else [float(answer.low), *proof.near.slacks.low[:, k]]
+    low[k] = max(min((bound for bound in bounds if bound > level), default=level), np.nextafter(level, np.inf))
+    return _met(dataclasses.replace(proof, low=low), doubt)
 
 
-def sign(
-    problem: Problem,
-    function: SlackFunction,
-    pieces: SeriesPieces,
-    intervals: Float[np.ndarray, "m 2"],
-    level: float,
-    met: float,
-) -> Minimum:
-    """Enclose the smallest slack within intervals until it is above a level or below it, or nearer than `met`."""
+def sign(problem: Problem, function: SlackFunction, pieces: SeriesPieces, doubt: Doubt, count: int) -> Minimum:
+    """Enclose the smallest slack within intervals until it is above its level or below it, or too near to it."""
 
     def is_enough(answer: Minimum) -> bool:
-        is_near = answer.low > level - met and answer.high < level + met
-        return bool(answer.low > level or answer.high < level or is_near)
+        is_near = answer.low > doubt.level - doubt.met and answer.high < doubt.level + doubt.met
+        return bool(answer.low > doubt.level or answer.high < doubt.level or is_near)
 
-    return minimum(
-        components_of(problem, function), blocks_of(pieces, intervals), is_enough, largest_count(problem.robot)
-    )
+    return minimum(components_of(problem, function), blocks_of(pieces, doubt.intervals), is_enough, count)
 
 
 def largest_count(robot: AnyRobot) -> int:

@@ -23,7 +23,7 @@ from cspr_jax.verification.exact.components import Component
 from cspr_jax.verification.exact.decisions import BITS, blocks_of, components_of, largest_count
 from cspr_jax.verification.exact.kinematics import Kinematics, balls
 from cspr_jax.verification.exact.minimum import Components, Minimum, PiecePart, attained, minimum
-from cspr_jax.verification.exact.series import SeriesPieces, ball, dot, precision, quotient
+from cspr_jax.verification.exact.series import SeriesPieces, ball, dot, number, precision, quotient
 from cspr_jax.verification.exact.slacks import (
     QUANTITIES,
     SlackFunction,
@@ -33,6 +33,7 @@ from cspr_jax.verification.exact.slacks import (
 )
 from cspr_jax.verification.proved_answers import MotionProof
 
+NEWTON, NEAR = 6, Fraction(1, 1000)  # steps that find a time, at most this part of a piece from the first one
 SMALL = 1e-3  # quantities below this fraction of their scale get digits relative to that fraction
 
 
@@ -97,12 +98,29 @@ def _enclosed(components: Components, blocks: Iterable[PiecePart], goal: Accurac
     if not is_enough(answer):
         return None
     last = max(block.piece.end for block in blocks)
-    time = min(float(answer.when), float(np.nextafter(float(last), 0.0)))
+    time = min(_stationary(components, blocks, answer.when), float(np.nextafter(float(last), 0.0)))
     piece = next(
         (block.piece for block in blocks if block.piece.start <= Fraction(time) <= block.piece.end), blocks[0].piece
     )
     value = attained(components(piece, ball(Fraction(time) - piece.start), None))
     return float(np.nextafter(float(answer.low), -np.inf)), float(value if value.is_finite() else answer.value), time
+
+
+def _stationary(components: Components, blocks: Sequence[PiecePart], time: Fraction) -> float:
+    # The time near which the lowest component is least, by Newton's method, which stays where that lies elsewhere.
+    piece = next(block.piece for block in blocks if block.piece.start <= time <= block.piece.end)
+    nearest = time
+    for _ in range(NEWTON):
+        parts = [part for part in components(piece, ball(nearest - piece.start), None) if part.applies]
+        if not parts:
+            return float(time)
+        lowest = min(parts, key=lambda part: float(part.value[0].mid())).value
+        if not lowest[2] > 0:
+            return float(time)
+        nearest = nearest - number(lowest[1] / (2 * lowest[2]))
+        if not piece.start <= nearest <= piece.end or abs(nearest - time) > NEAR * (piece.end - piece.start):
+            return float(time)
+    return float(nearest)
 
 
 def exact_peaks(problem: Problem, motions: Sequence[Any], peaks: Peaks, digits: int) -> Peaks:

@@ -12,7 +12,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot, across_line
 from cspr_jax.robots.model.winches import STANDSTILL
-from cspr_jax.verification.exact.series import SeriesState, absolute, cross, dot, quotient, root, times
+from cspr_jax.verification.exact.series import Series, SeriesState, absolute, cross, dot, quotient, root, times
 
 Vector = list[Any]
 
@@ -135,7 +135,17 @@ class Kinematics:
 
     @cached_property
     def _solved(self) -> tuple[Vector, Any]:
-        return solved(list(map(list, zip(*self.columns, strict=True))), self.wrench)
+        # With the inverse in the middle, rounded, the matrix is nearly one, so that balls grow little.
+        matrix, count = list(map(list, zip(*self.columns, strict=True))), len(self.wrench)
+        centre = flint.arb_mat(count, count, [x[0].mid() for row in matrix for x in row])
+        try:
+            inverse = centre.inv().mid()
+        except ZeroDivisionError:
+            return solved(matrix, self.wrench)
+        rows = [[inverse[i, j] for j in range(count)] for i in range(count)]
+        product = [[dot(row, column) for column in zip(*matrix, strict=True)] for row in rows]
+        solution, determinant = solved(product, [dot(row, self.wrench) for row in rows])
+        return solution, quotient(determinant, Series([inverse.det()]))
 
     @property
     def tensions(self) -> Vector:

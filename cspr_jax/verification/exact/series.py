@@ -74,7 +74,7 @@ class SeriesPiece:
 
     Args:
         piece: with its formulas.
-        index: of the piece in its motion.
+        index: its number in the motion, from 0 on.
     """
 
     def __init__(self, piece: MotionPiece, index: int = 0) -> None:
@@ -88,14 +88,20 @@ class SeriesPiece:
 
     def state(self, middle: flint.arb, radius: flint.arb | None = None) -> SeriesState:
         """State around a time since the start of the piece; with a radius, enclosed for all times within it."""
+        outputs = self._outputs(Series([middle, 1]))
         u = Series([middle if radius is None else middle + flint.arb(0, radius.upper()), 1])
-        values = run(self._steps(), u, lambda x: Series([x]))
-        outputs = [values[i] for i in self.program.outputs]
+        if radius is not None:
+            offset = flint.arb_poly([flint.arb(0, radius.upper()), 1])
+            outputs = [_narrowed(*pair, offset) for pair in zip(outputs, self._outputs(u), strict=True)]
         position, velocity = outputs[:3], [x.derivative() for x in outputs[:3]]
         acceleration = [x.derivative() for x in velocity]
         if not self._is_body:
             return SeriesState(u, position, velocity, acceleration, piece=self.index)
         return SeriesState(u, position, velocity, acceleration, *turning(outputs[3:]), self.index)
+
+    def _outputs(self, u: Any) -> list[Any]:
+        values = run(self._steps(), u, lambda x: Series([x]))
+        return [values[i] for i in self.program.outputs]
 
     def _steps(self) -> list[tuple[str, Sequence[Any]]]:
         # Coefficients become balls once for each precision.
@@ -108,6 +114,15 @@ class SeriesPiece:
         return [
             (name, operands) for (name, _), operands in zip(self.program.steps, self._coefficients[bits], strict=True)
         ]
+
+
+def _narrowed(middle: Any, over: Any, offset: Any) -> Any:
+    # Balls over a block from the Taylor polynomial in its middle; the last coefficient over the block is the remainder.
+    last = STATES - 1
+    if not (over[last].is_finite() and all(middle[k].is_finite() for k in range(last))):
+        return over
+    polynomial = flint.arb_poly([*(middle[k] for k in range(last)), over[last]])
+    return Series(polynomial(offset).coeffs(), STATES)
 
 
 class SeriesPieces:
