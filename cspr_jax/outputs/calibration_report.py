@@ -40,7 +40,7 @@ def file_points(robot: PlatformRobot) -> Float[np.ndarray, "n 3"]:
 
 def parameter_rows(result: Calibrated, nominal: AnyRobot) -> list[dict[str, Any]]:
     """All parameters of the robot: nominal and calibrated values, standard deviations."""
-    deviations, units = np.sqrt(np.diagonal(result.covariance)), result.parameters.units
+    deviations, units = np.sqrt(np.maximum(np.diagonal(result.covariance), 0.0)), result.parameters.units
     is_unseen = result.estimate.measured.unseen_parts > UNSEEN
     rows = []
     for i, row in enumerate(result.parameters.rows):

@@ -159,7 +159,7 @@ class Oracle:
             "motor_speed_max": ("motor_too_fast", abs(speed)),
             "motor_torque_max": ("motor_over_torque", worst),
             "motor_power_max": ("motor_over_power", worst * abs(speed)),
-            "motor_load_max": ("motor_overloaded", worst / m["stall_torque"] + abs(speed) / m["no_load_speed"]),
+            "motor_load_max": ("motor_over_load", worst / m["stall_torque"] + abs(speed) / m["no_load_speed"]),
         }
 
     def smallest(self, times):

@@ -91,7 +91,7 @@ KEYS = {
     "motor_too_fast": "motor_speed_max",
     "motor_over_torque": "motor_torque_max",
     "motor_over_power": "motor_power_max",
-    "motor_overloaded": "motor_load_max",
+    "motor_over_load": "motor_load_max",
 }
 
 

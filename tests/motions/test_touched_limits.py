@@ -238,10 +238,9 @@ def test_cables_that_just_lose_their_tension_are_slack(fraction):
     ]
     found = planned({"family": "spline", "interpolation": "quintic", "robot": "prototype", "pose": poses})
     verdict = found.to_dict()["segments"][0]["verdict"]
-    assert (
-        verdict == {-SMALL: "feasible", 0.0: verdict, SMALL: "slack_cable"}[fraction]
-        and (fraction < 0) == found.feasible
-    )
+    # Of the motion itself rounding decides, and exact arithmetic tells which way: it is never undecided.
+    assert verdict in {-SMALL: ["feasible"], 0.0: ["feasible", "slack_cable"], SMALL: ["slack_cable"]}[fraction]
+    assert (verdict == "feasible") == found.feasible
 
 
 def test_what_may_be_missed():

@@ -26,6 +26,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification import attained
 from cspr_jax.verification.proved_answers import proof_of
 
 EXAMPLE = example_files.folder() / "cogiro.toml"
@@ -137,6 +138,8 @@ def test_what_no_proof_closes_is_undecided(monkeypatch):
         return full._replace(proof=dataclasses.replace(full.proof, low=np.full_like(full.proof.low, -1.0)))
 
     monkeypatch.setattr(redundant_checker, "proof_of", unproved)
+    monkeypatch.setattr(attained, "proof_of", lambda problem, motion, scene: unproved(problem, motion))
+    monkeypatch.setattr(attained, "has_exact", lambda: False)
     planned = cspr_jax.plan(keys)
     assert planned.answers.verdict.tolist() == [Verdict.UNDECIDED.value] and not planned.feasible
     assert planned.answers.margin_bound[0] < 0.0

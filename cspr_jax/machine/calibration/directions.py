@@ -175,7 +175,7 @@ def correlations(
     parameters: Parameters, covariance: Float[np.ndarray, "p p"], count: int
 ) -> list[tuple[str, str, float]]:
     """The most correlated pairs of parameters, the strongest first."""
-    deviations = np.sqrt(np.diagonal(covariance))
+    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))  # rounding of exact measurements
     safe = np.where(deviations > 0.0, deviations, 1.0)
     ratios = covariance / safe[:, None] / safe
     first, second = np.triu_indices(parameters.count, 1)
