@@ -17,7 +17,7 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.cause import Cause
-from cspr_jax.motion.leg import JoinedLeg, LegResult
+from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion, Placed, states_at
 from cspr_jax.motion.peaks import SAMPLES, Peaks, peaks
 from cspr_jax.motion.problem import Problem
@@ -185,7 +185,7 @@ def plan_of(plan_file: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(JoinedLeg(leg.waypoints.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.waypoints.frame
-    legs = tuple(_with_proofs(problem, leg, sequence.waypoints) for leg in legs)
+    legs = tuple(_with_proofs(problem, *each) for each in zip(legs, sequence.legs, strict=True))
     legs = with_mean_torques(problem, legs, lambda: _scene(problem, sequence.waypoints))
     why, extremes = _causes(frame, legs), _extremes(problem, robot_file, frame, legs, plan_file)
     frequencies, resonances = _frequencies(problem, robot_file, frame, legs, plan_file, z0)
@@ -223,14 +223,14 @@ def _point(plan_file: PlanFile, sequence: PlanLegs) -> str:
     return plan_file.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
-def _with_proofs(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
+def _with_proofs(problem: Problem, joined: JoinedLeg, leg: Leg) -> JoinedLeg:
     # Families prove feasible motions faster, but only the general proof says why a motion is not feasible.
-    if leg.answers.feasible.all() and not any(proof is not None for proof in leg.answers.proof):
-        return leg
+    if joined.answers.feasible.all() and not any(proof is not None for proof in joined.answers.proof):
+        return joined
     from cspr_jax.verification.attained import with_attained  # feasible plans do not need it
 
-    scene = _scene(problem, waypoints)
-    return dataclasses.replace(leg, answers=with_attained(problem, leg.answers, leg.motions, scene))
+    case = joined.motions, _scene(problem, leg.waypoints), leg.waypoints.arcs
+    return dataclasses.replace(joined, answers=with_attained(problem, joined.answers, *case))
 
 
 def _scene(problem: Problem, waypoints: Waypoints) -> Any:

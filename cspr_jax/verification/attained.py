@@ -5,6 +5,8 @@ ends and on both sides of joints give attained slacks; the search is refined aro
 is known to a millionth of the duration or better.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,6 +18,7 @@ from cspr_jax.motion.formulas import HasFormulas
 from cspr_jax.motion.motion import BESIDE, Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_values
+from cspr_jax.numerics.shapes import Bool, Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.runtime.exact_arithmetic import has_exact
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -33,11 +36,16 @@ Slacks = Callable[[np.ndarray], np.ndarray]
 
 
 def with_attained(
-    problem: Problem, answers: AnyAnswers, motions: Sequence[Motion], scene: Scene | None = None
+    problem: Problem,
+    answers: AnyAnswers,
+    motions: Sequence[Motion],
+    scene: Scene | None = None,
+    arcs: Num[np.ndarray, "n"] | None = None,
 ) -> AnyAnswers:
     """Answers with a proof of every segment that is not feasible, with attained slacks instead of upper bounds.
 
-    Margins of proofs are attained ones, too.
+    Margins of proofs are attained ones, too. Of a segment whose number of arcs is free, 0 in `arcs`, one refused motion
+    says nothing about those of other numbers.
     """
     proofs, before = np.array(answers.proof), [Verdict.FEASIBLE] * len(motions)
     for i, motion in enumerate(motions):
@@ -47,7 +55,8 @@ def with_attained(
         if proofs[i] is not None:
             before[i] = proofs[i].verdict
             proofs[i] = attained(problem, motion, proofs[i], scene)
-    answers = _with_verdicts(dataclasses.replace(answers, proof=proofs), before)
+    is_alone = (answers.tried_arcs == 0) | (0 if arcs is None else arcs > 0)
+    answers = _with_verdicts(dataclasses.replace(answers, proof=proofs), before, is_alone)
     if answers.margin_unit != "N" or not all(proofs):
         return answers
     moves = np.isfinite(answers.duration)
@@ -57,15 +66,16 @@ def with_attained(
     return dataclasses.replace(answers, **margins)
 
 
-def _with_verdicts(answers: AnyAnswers, before: list[Verdict]) -> AnyAnswers:
+def _with_verdicts(answers: AnyAnswers, before: list[Verdict], is_alone: Bool[np.ndarray, "n"]) -> AnyAnswers:
     # Take the verdicts of proofs where families, or bounds, leave them open or err; not where robots are uncertain.
     verdict, arcs = answers.verdict.copy(), answers.arcs.copy()
     for i, proof in enumerate(answers.proof):
         reasons = Verdict(int(verdict[i] & ~FEWER))
         if proof is None or not np.isnan(answers.tolerated[i]) or reasons not in (Verdict.UNDECIDED, before[i]):
             continue
-        verdict[i] = (verdict[i] & FEWER) | FLAGS(proof.verdict.value)
-        arcs[i] = answers.tried_arcs[i] if reasons and proof.is_feasible else arcs[i]
+        if proof.is_feasible or is_alone[i] or not reasons:
+            verdict[i] = (verdict[i] & FEWER) | FLAGS(proof.verdict.value)
+            arcs[i] = answers.tried_arcs[i] if reasons and proof.is_feasible else arcs[i]
     return dataclasses.replace(answers, verdict=verdict, arcs=arcs)
 
 

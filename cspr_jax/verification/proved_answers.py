@@ -72,7 +72,7 @@ class MotionProof(NamedTuple):
     @property
     def rounding(self) -> Float[np.ndarray, "n_criteria"]:
         """Distances of slacks from their levels within which rounding may have put them on the other side."""
-        return ROUNDED * (np.abs([row.allowed for row in self.criteria]) + self.scales)
+        return _rounding(self.criteria, self.scales)
 
     @property
     def doubtful(self) -> Bool[np.ndarray, "n_criteria"]:
@@ -239,6 +239,7 @@ def proofs_of(
     names = [(row.flag, () if row.flag in AT_TIMES else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     how: Any = {"intervals": intervals, "margins": parts.usual or parts.contacts}
+    how["rounding"] = _rounding(rows, _scales(problem, rows))
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), **how)
     return [_proof(problem, rows, proof, scene, parts) for proof in proofs]
 
@@ -368,6 +369,10 @@ def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
         return np.empty((0, 2))
     edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
     return np.stack([times[edges[:-1] == 1], times[edges[1:] == -1]], axis=1)
+
+
+def _rounding(rows: Sequence[Criterion], scales: Float[np.ndarray, "n_criteria"]) -> Float[np.ndarray, "n_criteria"]:
+    return ROUNDED * (np.abs([row.allowed for row in rows]) + scales)
 
 
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:

@@ -73,10 +73,14 @@ def time_proofs(
     groups: Int[np.ndarray, "n_criteria"] | None = None,
     *,
     level: np.ndarray | float = 0.0,
+    rounding: np.ndarray | float = 0.0,
     intervals: bool = True,
     margins: bool = True,
 ) -> list[TimeProof]:
-    """Decide criteria over several full motions at once; only with `margins` are smallest slacks narrowed down."""
+    """Decide criteria over several full motions at once; only with `margins` are smallest slacks narrowed down.
+
+    Blocks may hold a smallest slack if bounds that are wrong by `rounding` would let them.
+    """
     count = len(durations)
     if not count:
         return []
@@ -100,9 +104,9 @@ def time_proofs(
         totals += np.bincount(blocks.motion, minlength=count)
     if not margins:
         blocks = joined(leaves)
-        return _proofs(blocks.take(np.lexsort((blocks.start, blocks.motion))), totals, level)
+        return _proofs(blocks.take(np.lexsort((blocks.start, blocks.motion))), totals, level, rounding)
     narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
-    return _proofs(narrow.take(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
+    return _proofs(narrow.take(np.lexsort((narrow.start, narrow.motion))), totals + more, level, rounding)
 
 
 def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, full: BlockSlacks | None) -> TimeBlocks:
@@ -166,7 +170,9 @@ def _grouped(values: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
     return smallest[:, groups]
 
 
-def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -> list[TimeProof]:
+def _proofs(
+    blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float, rounding: np.ndarray | float
+) -> list[TimeProof]:
     count = len(totals)
     low, high = (_smallest(blocks.motion, side, count) for side in blocks.slacks[:2])
     failing = [_merged(blocks, column, count) for column in (blocks.slacks.high < level).T]
@@ -174,7 +180,8 @@ def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -
     proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
-        near = blocks.take(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
+        may_hold = blocks.slacks.low[first:last] <= high[i] + 2.0 * np.asarray(rounding)
+        near = blocks.take(first + np.flatnonzero(may_hold.any(1)))
         near = near._replace(motion=np.zeros_like(near.motion))  # the proof is of a single motion
         sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
         proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))

@@ -112,9 +112,12 @@ def hexapod():
     inner = np.radians([-50, 70, 70, 190, 190, 310])
     arms = np.round(np.c_[0.5 * np.cos(inner), 0.5 * np.sin(inner), -0.05 + 0 * inner], 6)
     steps, x = quintic([-0.1, 0.05, 2.0], [0.15, 0.1, 2.2])
-    turns, q = quintic([1.0, 0.02, 0.0, -0.03], [0.9, -0.03, 0.05, 0.04])[0], None
+    turns = quintic([1.0, 0.02, 0.0, -0.03], [0.9, -0.03, 0.05, 0.04])[0]
     rows = [np.array(step[1]) for step in turns]
-    q = lambda t: np.array([np.polyval(row[::-1], t) for row in rows])  # noqa: E731
+
+    def q(t):
+        return np.array([np.polyval(row[::-1], t) for row in rows])
+
     robot = {
         "base_points": base.tolist(),
         "mass": 12.0,

@@ -113,7 +113,7 @@ def _tensions(problem: Problem, at: Kinematics, middle: flint.arb, bound: Fracti
     limit, lower, upper = ball(bound), balls(low), balls(high)
 
     def components(on: Kinematics) -> list[tuple[Component, flint.arb]]:
-        u = on.time - middle
+        u = on.state.time - middle
         affine = [f + u * rate for f, rate in zip(exact, rates, strict=True)]
         rows = list(zip(*on.columns, strict=True))
         left = [w - dot(row, affine) for w, row in zip(on.wrench, rows, strict=True)]

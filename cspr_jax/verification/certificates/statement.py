@@ -21,7 +21,7 @@ from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot, across_line
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.verification.criteria import bounds_tensions
-from cspr_jax.verification.exact.contacts import sector_vectors
+from cspr_jax.verification.exact.contacts import obstacle_points, sector_vectors
 
 LONGEST_DECIMAL = 60  # digits of a number that is not written as a fraction
 WINCH_NUMBERS = ("drum_radius", "gear_ratio", "motor_inertia", "friction", "viscous_friction", "efficiency")
@@ -121,12 +121,8 @@ def _pair(robot: AnyRobot, scene: Scene, bodies: Bodies, kind: str, cable: int, 
 
 
 def _obstacle(bodies: Bodies, k: int) -> dict[str, Any]:
-    number = int(np.asarray(bodies.order)[k])
-    if number < len(bodies.rods):
-        axis = np.asarray(bodies.rods[number])
-        points = axis[:1] if (axis[0] == axis[1]).all() else axis
-        return {"points": texts(points), "radius": texts(bodies.rod_radii[number])}
-    return {"points": texts(bodies.boxes.corners[number - len(bodies.rods)]), "radius": "0"}  # type: ignore[union-attr]
+    points, radius = obstacle_points(bodies, k)
+    return {"points": texts(points), "radius": texts(radius)}
 
 
 def motion_statement(pieces: Sequence[MotionPiece], feeds: Sequence[float] | None = None) -> dict[str, Any]:

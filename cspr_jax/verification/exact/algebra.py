@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import flint
@@ -20,14 +21,14 @@ import numpy as np
 from cspr_jax.motion.formulas import MotionPiece, program
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.exact.facets import determinant
-from cspr_jax.verification.exact.series import BINARY, cross, dot, run, times, turning
+from cspr_jax.verification.exact.kinematics import StateBalance
+from cspr_jax.verification.exact.series import BINARY, SeriesState, dot, run, turning
 
 Vector = list[Any]
 LARGEST_ANGLE = 1  # rad; half of a larger one may come near the pole of its tangent
@@ -65,7 +66,7 @@ class RationalFunction:
     def _other(self, value: Any) -> "RationalFunction":
         if isinstance(value, RationalFunction):
             return value
-        return self._with(flint.fmpq_poly([rational(value) if isinstance(value, Fraction) else value]), ONE)
+        return self._with(flint.fmpq_poly([value if isinstance(value, flint.fmpq) else rational(value)]), ONE)
 
     def __add__(self, value: Any) -> "RationalFunction":
         """Sum."""
@@ -116,7 +117,7 @@ VARIABLE = flint.fmpq_poly([0, 1])
 
 
 class AlgebraicPiece(NamedTuple):
-    """MotionPiece of a motion in rational functions.
+    """Piece of a motion in rational functions.
 
     Fields:
         outputs: position, and quaternion of a body.
@@ -142,7 +143,7 @@ def algebraic_piece(piece: MotionPiece, middle: Fraction) -> AlgebraicPiece:
     angle = _angle(steps)
     if angle is None:
         time = RationalFunction(VARIABLE, ONE, ONE)
-        values = run(steps, time, lambda c: time * 0 + rational(c))
+        values = run(steps, time, lambda c: time * 0 + c)
         return AlgebraicPiece([values[i] for i in outputs], _ball, lambda value: value)
     # Near half a turn the tangent has a pole: go by half a turn.
     start, rate = angle
@@ -157,7 +158,7 @@ def algebraic_piece(piece: MotionPiece, middle: Fraction) -> AlgebraicPiece:
         if name in ("cos", "sin"):
             values[i] = cosine if name == "cos" else sine
         elif name == "poly":
-            values[i] = of_time * 0 + rational(operands[0])
+            values[i] = of_time * 0 + operands[0]
         else:
             values[i] = BINARY[name](*(values[k] for k in operands))
 
@@ -191,40 +192,27 @@ def _ball(value: Fraction) -> flint.arb:
     return flint.arb(rational(value))
 
 
-class _Body:
-    # Rays, determinants and derivatives of a robot on a piece.
+class _Body(StateBalance):
+    # Balance of a robot on a piece, with rays from the effector to the spools in place of unit vectors.
     def __init__(self, robot: AnyRobot, outputs: list[RationalFunction]) -> None:
-        self.position = outputs[:3]
-        self.velocity = [x.derivative() for x in self.position]
-        self.acceleration = [x.derivative() for x in self.velocity]
-        base = _rationals(robot.base_points)
-        arms: list[Vector] = [[outputs[0] * 0] * 3] * len(base)
-        if isinstance(robot, PlatformRobot):
-            rotation, velocity, second = turning(outputs[3:])
-            arms = [times(rotation, point) for point in _rationals(robot.platform_points)]
-        points = [[x + y for x, y in zip(self.position, arm, strict=True)] for arm in arms]
-        self.rays = [
-            [b - x for b, x in zip(spool, point, strict=True)] for spool, point in zip(base, points, strict=True)
-        ]
-        self.squares = [dot(ray, ray) for ray in self.rays]
-        row, mass = PATTERNS[robot.pattern], rational(float(robot.mass))
-        x, y, z = self.acceleration
-        force = [part * mass for part in (x, y, z - rational(float(robot.gravity)))]
-        columns = [[ray[k] for k in row.forces] for ray in self.rays]
-        wrench = [force[k] for k in row.forces]
-        if isinstance(robot, PlatformRobot):
-            inertia = _rationals(robot.inertia)
-            across = list(zip(*rotation, strict=True))
+        position, velocity = outputs[:3], [x.derivative() for x in outputs[:3]]
+        parts = position[0] * 0, position, velocity, [x.derivative() for x in velocity]
+        super().__init__(robot, SeriesState(*parts, *(turning(outputs[3:]) if outputs[3:] else ())), rational)
 
-            def of_inertia(vector: Vector) -> Vector:
-                return times(rotation, times(inertia, times(across, vector)))
+    @cached_property
+    def rays(self) -> list[Vector]:
+        """Vectors from the attachment points to the spools."""
+        spools = self.numbers(self.robot.base_points)
+        return [[b - x for b, x in zip(*ends, strict=True)] for ends in zip(spools, self.points, strict=True)]
 
-            spin = cross(velocity, of_inertia(velocity))
-            moment = [a + b for a, b in zip(of_inertia(second), spin, strict=True)]
-            moments = [cross(arm, ray) for arm, ray in zip(arms, self.rays, strict=True)]
-            columns = [[*column, *(m[k] for k in row.moments)] for column, m in zip(columns, moments, strict=True)]
-            wrench = [*wrench, *(moment[k] for k in row.moments)]
-        self.columns, self.wrench = columns, wrench
+    @cached_property
+    def columns(self) -> list[Vector]:
+        """Columns of the balance in tensions over lengths."""
+        return self.columns_along(self.rays)
+
+    def square(self, k: int) -> RationalFunction:
+        """Square of the length of a cable."""
+        return dot(self.rays[k], self.rays[k])
 
     def scaled_tension(self, k: int) -> tuple[RationalFunction, RationalFunction]:
         """Numerator and determinant of the tension of a cable over its length."""
@@ -233,18 +221,15 @@ class _Body:
 
     def rate_squared(self, k: int) -> RationalFunction:
         """Square of the speed of a cable."""
-        along = dot(self.rays[k], self.velocity)
-        return along * along / self.squares[k]
+        along = dot(self.rays[k], self.state.velocity)
+        return along * along / self.square(k)
 
     def acceleration_squared(self, k: int) -> RationalFunction:
         """Square of the acceleration of a cable of a point mass."""
-        square, along = self.squares[k], dot(self.rays[k], self.velocity)
-        value = (dot(self.velocity, self.velocity) - dot(self.rays[k], self.acceleration)) * square - along * along
+        ray, velocity, square = self.rays[k], self.state.velocity, self.square(k)
+        along = dot(ray, velocity)
+        value = (dot(velocity, velocity) - dot(ray, self.state.acceleration)) * square - along * along
         return value * value / (square * square * square)
-
-
-def _rationals(array: Any) -> list[Vector]:
-    return [[rational(float(x)) for x in row] for row in np.asarray(array, float)]
 
 
 def sign_function(problem: Problem, row: Criterion, piece: AlgebraicPiece) -> tuple[list[RationalFunction], bool]:
@@ -254,27 +239,26 @@ def sign_function(problem: Problem, row: Criterion, piece: AlgebraicPiece) -> tu
         NotAlgebraicError: the criterion has no such form.
     """
     robot, k = problem.robot, row.cables[0] if row.cables else 0
-    pattern = PATTERNS[robot.pattern]
-    if robot.pulleys is not None or pattern.along_line or pattern.is_jointed:
+    if robot.pulleys is not None:
         raise NotAlgebraicError
     body, is_body = _Body(robot, piece.outputs), isinstance(robot, PlatformRobot)
     limit = rational(row.allowed) + rational(row.allowance) * (1 if row.sense == "most" else -1)
     quantity = next((each.quantity for each in LIMITS if each.flag == row.flag), None)
     if row.flag in (Verdict.SLACK_CABLE, Verdict.OVER_TENSION):
         top, bottom = body.scaled_tension(k)
-        signs, square = top * bottom, top * top * body.squares[k]
+        signs, square = top * bottom, top * top * body.square(k)
         if row.flag == Verdict.OVER_TENSION:
             return [bottom * bottom * (limit * limit) - square], False
         is_strict = limit == 0
         return [signs] if is_strict else [signs, square - bottom * bottom * (limit * limit)], is_strict
     if row.flag == Verdict.ABOVE_SPOOLS:
-        return [dot([rational(float(x)) for x in plane_normal(robot)], body.position)], True
+        return [dot(body.numbers(plane_normal(robot)), body.state.position)], True
     if quantity == "depth" and not is_body:
-        return [limit - body.position[2]], False
+        return [limit - body.state.position[2]], False
     squares: dict[str | None, Callable[[], RationalFunction]] = {
-        "length": lambda: body.squares[k],
-        "mass_centre_speed": lambda: dot(body.velocity, body.velocity),
-        "mass_centre_acceleration": lambda: dot(body.acceleration, body.acceleration),
+        "length": lambda: body.square(k),
+        "mass_centre_speed": lambda: dot(body.state.velocity, body.state.velocity),
+        "mass_centre_acceleration": lambda: dot(body.state.acceleration, body.state.acceleration),
     }
     if not is_body:
         squares |= {"speed": lambda: body.rate_squared(k), "acceleration": lambda: body.acceleration_squared(k)}

@@ -75,11 +75,11 @@ def contact_bodies(robot: AnyRobot, scene: Scene) -> list[BodyPair]:
             radius = float(bodies.radii[cable] + bodies.radii[other])
             pairs.append(BodyPair(_cable(cable), _cable(other), radius, False))
         elif kind == "obstacle":
-            points, radius = _obstacle(bodies, other)
-            pairs.append(BodyPair(_cable(cable), _fixed(points), radius + float(bodies.radii[cable]), False))
+            points, radius = obstacle_points(bodies, other)
+            pairs.append(BodyPair(_cable(cable), _fixed(balls(points)), radius + float(bodies.radii[cable]), False))
         elif kind == "platform-obstacle":
-            points, radius = _obstacle(bodies, other)
-            pairs.append(BodyPair(_corners(bodies), _inward_points(points), radius, True))
+            points, radius = obstacle_points(bodies, other)
+            pairs.append(BodyPair(_corners(bodies), _inward_points(balls(points)), radius, True))
         elif has_sectors(robot, scene):
             sector = np.array(sector_vectors(bodies, cable), float)
             normal = None if np.asarray(bodies.sectors[0])[cable].any() else np.asarray(bodies.sectors[1])
@@ -122,6 +122,8 @@ def separating(
     """Direction along which two bodies are farthest apart, and weights of the differences at their nearest points."""
     from scipy.optimize import nnls  # few checks need it
 
+    if not np.isfinite(differences).all():  # no direction is better than another
+        return np.array([0.0, 0.0, 1.0]), np.full(len(differences), 1.0 / len(differences))
     if sector is not None:
         fractions = nnls(sector.T, differences[0])[0]
         direction = differences[0] - sector.T @ fractions
@@ -165,7 +167,9 @@ def _shortened(bodies: Bodies, k: int) -> Points:
         cable = at.cables[k]
         columns = list(zip(*at.state.rotation, strict=True))
         away = times(columns, cable.unit)
-        start = [x + leave * y for x, y in zip(attached, away, strict=True)]
+        # Nothing is said of a cable that may be no longer than the part that is left out.
+        part = leave if cable.free[0] > leave else flint.arb("nan")
+        start = [x + part * y for x, y in zip(attached, away, strict=True)]
         return [start, [x + cable.free * y for x, y in zip(attached, away, strict=True)]]
 
     return points
@@ -179,13 +183,13 @@ def _corner(bodies: Bodies, k: int) -> Points:
     return _fixed([balls(bodies.points[k])])
 
 
-def _obstacle(bodies: Bodies, k: int) -> tuple[list[list[Any]], float]:
-    # Points and radius of an obstacle.
+def obstacle_points(bodies: Bodies, k: int) -> tuple[np.ndarray, float]:
+    """Points (m, 3) whose convex hull, widened by a radius, an obstacle is, and that radius, m."""
     number = int(np.asarray(bodies.order)[k])
     if number < len(bodies.rods):
         axis = np.asarray(bodies.rods[number])
-        return balls(axis[:1] if (axis[0] == axis[1]).all() else axis), float(bodies.rod_radii[number])
-    return balls(cast("Shape", bodies.boxes).corners[number - len(bodies.rods)]), 0.0
+        return (axis[:1] if (axis[0] == axis[1]).all() else axis), float(bodies.rod_radii[number])
+    return np.asarray(cast("Shape", bodies.boxes).corners[number - len(bodies.rods)]), 0.0
 
 
 def sector_vectors(bodies: Bodies, k: int) -> list[list[Fraction]]:

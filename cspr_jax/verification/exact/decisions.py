@@ -1,7 +1,7 @@
-"""Decisions of what a proof by bounds leaves open: the sign of a slack within its open intervals, by balls and algebra.
+"""Decisions of what a proof by bounds leaves open, or decides within its own rounding: signs of slacks, exactly.
 
-Only open intervals of criteria that are neither met nor broken are looked at, so that nothing is slower where nothing
-is open.
+Only times at which such a slack may be on either side of its level are looked at, so that nothing is slower where
+nothing is in doubt.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.criteria import Criterion, levels
 from cspr_jax.verification.exact.algebra import ROOT_BITS, decided_sign
 from cspr_jax.verification.exact.components import Component
@@ -36,6 +38,7 @@ BITS = 256  # precision of balls, of which bounds of slacks lose some dozens
 MET = 1e-30  # a slack nearer to its level than this, over its scale, is left to algebra
 FEW_BLOCKS = 400  # number of blocks before algebra is asked
 MOST_BLOCKS = 20_000  # largest number of blocks for one criterion, some ten seconds
+BODY = 5  # a block of a body that turns costs as many of a point mass
 FACETS = 8  # so many facets of redundant cables cost as much as all else
 
 
@@ -46,8 +49,9 @@ def decided(problem: Problem, motion: Any, case: MotionProof, scene: Scene | Non
         pieces = SeriesPieces(motion.formulas())
         for k in np.flatnonzero(case.doubtful[: len(functions)]).tolist():
             function = functions[k]
-            if function is not None:
-                doubt = Doubt(k, float(levels(case.criteria)[k]), MET * float(case.scales[k]), _intervals(case, k))
+            intervals = _intervals(case, k)
+            if function is not None and len(intervals):
+                doubt = Doubt(k, float(levels(case.criteria)[k]), MET * float(case.scales[k]), intervals)
                 case = case._replace(proof=_decided(problem, case, doubt, function, pieces))
     return case
 
@@ -67,29 +71,44 @@ class Doubt(NamedTuple):
     met: float
     intervals: np.ndarray
 
+    def is_near(self, answer: Minimum) -> bool:
+        """Tell whether the smallest slack is enclosed so near to its level that only algebra can decide."""
+        return bool(answer.low > self.level - self.met and answer.high < self.level + self.met)
+
 
 def _intervals(case: MotionProof, k: int) -> Float[np.ndarray, "m 2"]:
-    # Times at which a criterion may be met or broken: open ones, and blocks with slacks within rounding of the level.
-    near, level = case.proof.near, float(levels(case.criteria)[k])
-    if near is None:
-        return case.proof.open[k]
-    chosen = near.slacks.low[:, k] < level + case.rounding[k]
-    blocks = np.stack([near.start[chosen], near.end[chosen]], axis=1)
-    return united(np.concatenate([case.proof.open[k], case.proof.failing[k], blocks]))
+    # Times at which a criterion may be met or broken: those that are open or fail, and blocks within rounding.
+    lows, near = _lows(case.proof, k), case.proof.near
+    parts = [case.proof.open[k], case.proof.failing[k]]
+    if near is not None and len(lows):
+        chosen = lows < float(levels(case.criteria)[k]) + case.rounding[k]
+        parts.append(np.stack([near.start[chosen], near.end[chosen]], axis=1))
+    return united(np.concatenate(parts))
+
+
+def _lows(proof: TimeProof, k: int) -> Float[np.ndarray, "n"]:
+    # Lower bounds over the blocks that a proof leaves; none for feeds, whose proof has blocks of its own.
+    if proof.near is None or k >= proof.near.slacks.low.shape[1]:
+        return np.empty(0)
+    return proof.near.slacks.low[:, k]
 
 
 def _decided(
     problem: Problem, case: MotionProof, doubt: Doubt, function: SlackFunction, pieces: SeriesPieces
 ) -> TimeProof:
-    # A few blocks, then algebra, then as many blocks as are allowed.
+    # A few blocks, then algebra, then as many blocks as are allowed. Determinants of bodies are polynomials of such
+    # degrees that algebra comes last, and only where the slack is very near to its level.
+    row = case.criteria[doubt.column]
+    is_costly = PATTERNS[problem.robot.pattern].is_body and row.flag in (Verdict.SLACK_CABLE, Verdict.OVER_TENSION)
     for count in (FEW_BLOCKS, largest_count(problem.robot)):
         answer = sign(problem, function, pieces, doubt, count)
         if answer.high < doubt.level or answer.low > doubt.level:
             return _with(case.proof, doubt, answer)
-        if count == FEW_BLOCKS:
-            proof = _met_exactly(problem, case.criteria[doubt.column], pieces.formulas, case.proof, doubt)
-            if proof is not None:
-                return proof
+        is_near = doubt.is_near(answer)
+        if is_near or not is_costly:
+            proof = _met_exactly(problem, row, pieces.formulas, case.proof, doubt)
+            if proof is not None or is_near:
+                return proof or case.proof
     return case.proof
 
 
@@ -135,7 +154,7 @@ def _with(proof: TimeProof, doubt: Doubt, answer: Minimum) -> TimeProof:
     if answer.high < level:
         high[k], when[k] = min(float(answer.value), np.nextafter(level, -np.inf)), float(answer.when)
         return dataclasses.replace(proof, high=high, when=when, open=_without(proof.open, k))
-    bounds = [float(answer.low)] if proof.near is None else [float(answer.low), *proof.near.slacks.low[:, k]]
+    bounds = [float(answer.low), *_lows(proof, k)]
     low[k] = max(min((bound for bound in bounds if bound > level), default=level), np.nextafter(level, np.inf))
     return _met(dataclasses.replace(proof, low=low), doubt)
 
@@ -144,8 +163,7 @@ def sign(problem: Problem, function: SlackFunction, pieces: SeriesPieces, doubt:
     """Enclose the smallest slack within intervals until it is above its level or below it, or too near to it."""
 
     def is_enough(answer: Minimum) -> bool:
-        is_near = answer.low > doubt.level - doubt.met and answer.high < doubt.level + doubt.met
-        return bool(answer.low > doubt.level or answer.high < doubt.level or is_near)
+        return bool(answer.low > doubt.level or answer.high < doubt.level) or doubt.is_near(answer)
 
     return minimum(components_of(problem, function), blocks_of(pieces, doubt.intervals), is_enough, count)
 
@@ -153,7 +171,8 @@ def sign(problem: Problem, function: SlackFunction, pieces: SeriesPieces, doubt:
 def largest_count(robot: AnyRobot) -> int:
     """Largest number of blocks for one criterion of a robot, so that a decision takes no more than some minutes."""
     facets = math.comb(robot.n_cables, robot.dof - 1) if robot.n_cables > robot.dof else 0
-    return MOST_BLOCKS // (1 + facets // FACETS)
+    bodies = BODY if PATTERNS[robot.pattern].is_body else 1
+    return MOST_BLOCKS // max(1 + facets // FACETS, bodies)
 
 
 def components_of(problem: Problem, function: SlackFunction) -> Components:

@@ -56,7 +56,7 @@ def with_extremes(problem: Problem, motion: Any, case: MotionProof, scene: Scene
 def _near(pieces: SeriesPieces, case: MotionProof, k: int) -> Iterable[PiecePart]:
     # Blocks that may hold the smallest slack of a criterion.
     near = case.proof.near
-    if near is None:
+    if near is None or k >= near.slacks.low.shape[1]:
         return _all(pieces)
     chosen = near.slacks.low[:, k] <= case.proof.high[k]
     return blocks_of(pieces, np.stack([near.start[chosen], near.end[chosen]], axis=1))

@@ -1,7 +1,8 @@
-"""Cables of a robot along a motion, as series of balls: lengths, directions, wrench matrix, tensions, motors."""
+"""Balance of a robot along a motion in any arithmetic; as series of balls also its cables, tensions and motors."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, cast
 
@@ -22,6 +23,83 @@ def balls(array: Any) -> Any:
     return np.vectorize(lambda x: flint.arb(float(x)), otypes=[object])(np.asarray(array, float)).tolist()
 
 
+class StateBalance:
+    """Forces and moments of a robot at a state, in any arithmetic.
+
+    Args:
+        robot: in the axes of the kernels.
+        state: of its mass centre.
+        number: what makes a number of the arithmetic of a floating-point number.
+    """
+
+    def __init__(self, robot: AnyRobot, state: SeriesState, number: Callable[[float], Any] = flint.arb) -> None:
+        """Hold robot and state."""
+        self.robot, self.state, self._number = robot, state, number
+        self._row = PATTERNS[robot.pattern]
+
+    def numbers(self, array: Any) -> Any:
+        """Numbers of an array in the arithmetic, nested as they are."""
+        return np.vectorize(self._number, otypes=[object])(np.asarray(array, float)).tolist()
+
+    @cached_property
+    def arms(self) -> list[Vector]:
+        """Attachment points from the mass centre, fixed axes, m."""
+        if not isinstance(self.robot, PlatformRobot):
+            return [[self.state.position[0] * 0] * 3] * self.robot.n_cables
+        return [times(self.state.rotation, point) for point in self.numbers(self.robot.platform_points)]
+
+    @cached_property
+    def points(self) -> list[Vector]:
+        """Attachment points, m."""
+        return [[x + y for x, y in zip(self.state.position, arm, strict=True)] for arm in self.arms]
+
+    @cached_property
+    def wrench(self) -> Vector:
+        """Wrench that the cables must supply."""
+        mass, gravity = self._number(float(self.robot.mass)), self._number(float(self.robot.gravity))
+        x, y, z = self.state.acceleration
+        force = [part * mass for part in (x, y, z - gravity)]
+        return self.balanced(force, self._moment(force) if isinstance(self.robot, PlatformRobot) else force)
+
+    def _moment(self, force: Vector) -> Vector:
+        # Moment that the cables must supply about the mass centre, or about a joint.
+        robot: Any = self.robot
+        rotation, velocity, inertia = self.state.rotation, self.state.angular_velocity, self.numbers(robot.inertia)
+        centre = robot.centre_of_mass if self._row.is_jointed else None
+        if centre is not None:
+            arm, mass = self.numbers(centre), self._number(float(robot.mass))
+            square = dot(arm, arm)
+            inertia = [
+                [entry + mass * ((square if i == j else 0) - arm[i] * arm[j]) for j, entry in enumerate(row)]
+                for i, row in enumerate(inertia)
+            ]
+        columns = list(zip(*rotation, strict=True))
+
+        def of_inertia(vector: Vector) -> Vector:
+            return times(rotation, times(inertia, times(columns, vector)))
+
+        inertial, spin = of_inertia(self.state.angular_acceleration), cross(velocity, of_inertia(velocity))
+        moment = [a + b for a, b in zip(inertial, spin, strict=True)]
+        if centre is None:
+            return moment
+        return [a + b for a, b in zip(moment, cross(times(rotation, self.numbers(centre)), force), strict=True)]
+
+    def balanced(self, force: Vector, moment: Vector) -> Vector:
+        """Components of a force and a moment that the cables balance."""
+        parts = [force[k] for k in self._row.forces]
+        if not self._row.along_line:
+            return parts + [moment[k] for k in self._row.moments]
+        across = self.numbers(np.asarray(across_line(cast("PlatformRobot", self.robot))).T)
+        return parts + [dot(times(self.state.rotation, axis), moment) for axis in across]
+
+    def columns_along(self, directions: Sequence[Vector]) -> list[Vector]:
+        """Wrenches of forces along directions at the attachment points, one for each cable."""
+        return [
+            self.balanced(direction, cross(arm, direction))
+            for arm, direction in zip(self.arms, directions, strict=True)
+        ]
+
+
 class CableSeries(NamedTuple):
     """A cable.
 
@@ -38,8 +116,8 @@ class CableSeries(NamedTuple):
     length: Any
 
 
-class Kinematics:
-    """Cables and wrenches of a robot at a state.
+class Kinematics(StateBalance):
+    """Cables and wrenches of a robot at a state, as series of balls.
 
     Args:
         robot: in the axes of the kernels.
@@ -52,23 +130,8 @@ class Kinematics:
         self, robot: AnyRobot, state: SeriesState, directions: dict[int, Any] | None = None, *, is_point: bool = True
     ) -> None:
         """Hold robot and state."""
-        self.robot, self.state, self.time, self.is_point = robot, state, state.time, is_point
-        self.directions = {} if directions is None else directions
-        self._row = PATTERNS[robot.pattern]
-
-    @cached_property
-    def arms(self) -> list[Vector]:
-        """Attachment points from the mass centre, fixed axes, m."""
-        if self.state.rotation is None or not isinstance(self.robot, PlatformRobot):
-            nothing = [self.state.position[0] * 0] * 3
-            return [nothing] * self.robot.n_cables
-        rotation = self.state.rotation
-        return [times(rotation, point) for point in balls(self.robot.platform_points)]
-
-    @cached_property
-    def points(self) -> list[Vector]:
-        """Attachment points, m."""
-        return [[x + y for x, y in zip(self.state.position, arm, strict=True)] for arm in self.arms]
+        super().__init__(robot, state)
+        self.is_point, self.directions = is_point, {} if directions is None else directions
 
     @cached_property
     def cables(self) -> list[CableSeries]:
@@ -85,53 +148,7 @@ class Kinematics:
     @cached_property
     def columns(self) -> list[Vector]:
         """Wrenches of unit tensions, one for each cable: columns of the wrench matrix."""
-        return [
-            self._balanced(cable.unit, cross(arm, cable.unit))
-            for arm, cable in zip(self.arms, self.cables, strict=True)
-        ]
-
-    @cached_property
-    def wrench(self) -> Vector:
-        """Wrench that the cables must supply."""
-        mass, gravity = flint.arb(float(self.robot.mass)), flint.arb(float(self.robot.gravity))
-        x, y, z = self.state.acceleration
-        force = [mass * part for part in (x, y, z - gravity)]
-        if not isinstance(self.robot, PlatformRobot):
-            return self._balanced(force, force)
-        return self._balanced(force, self._moment(force))
-
-    def _moment(self, force: Vector) -> Vector:
-        # Moment that the cables must supply about the mass centre, or about a joint.
-        robot: Any = self.robot
-        state = self.state
-        rotation, velocity = state.rotation, state.angular_velocity
-        inertia = balls(robot.inertia)
-        centre = robot.centre_of_mass if self._row.is_jointed else None
-        if centre is not None:
-            arm, mass = balls(centre), flint.arb(float(robot.mass))
-            square = dot(arm, arm)
-            inertia = [
-                [entry + mass * ((square if i == j else 0) - arm[i] * arm[j]) for j, entry in enumerate(row)]
-                for i, row in enumerate(inertia)
-            ]
-        columns = list(zip(*rotation, strict=True))
-
-        def of_inertia(vector: Vector) -> Vector:
-            return times(rotation, times(inertia, times(columns, vector)))
-
-        inertial, spin = of_inertia(state.angular_acceleration), cross(velocity, of_inertia(velocity))
-        moment = [a + b for a, b in zip(inertial, spin, strict=True)]
-        if centre is None:
-            return moment
-        return [a + b for a, b in zip(moment, cross(times(rotation, balls(centre)), force), strict=True)]
-
-    def _balanced(self, force: Vector, moment: Vector) -> Vector:
-        # Components of a force and a moment that the cables balance.
-        parts = [force[k] for k in self._row.forces]
-        if not self._row.along_line:
-            return parts + [moment[k] for k in self._row.moments]
-        across = balls(np.asarray(across_line(cast("PlatformRobot", self.robot))).T)
-        return parts + [dot(times(self.state.rotation, axis), moment) for axis in across]
+        return self.columns_along([cable.unit for cable in self.cables])
 
     @cached_property
     def _solved(self) -> tuple[Vector, Any]:

@@ -45,15 +45,11 @@ class Minimum(NamedTuple):
         low: lower bound, -inf without one.
         value: ball of an attained value, inf without one: the smallest value is not larger.
         when: time at which it is attained, from the start of the motion, s.
-        left: block that holds the lower bound; None: there is none.
-        blocks: number of blocks that were bounded.
     """
 
     low: flint.arb
     value: flint.arb
     when: Fraction
-    left: PiecePart | None
-    blocks: int
 
     @property
     def high(self) -> flint.arb:
@@ -69,7 +65,7 @@ def minimum(
     best, when, count = flint.arb("inf"), Fraction(0), 0
     pending = list(blocks)
     shortest = min((block.end - block.start for block in pending), default=Fraction(0)) * SHORTEST
-    floor, left = flint.arb("inf"), None
+    floor = flint.arb("inf")
     while True:
         for block in pending:
             low, value, time = _bounds(components, block)
@@ -80,12 +76,12 @@ def minimum(
                 heapq.heappush(heap, (low, next(order), block))
         lowest = heap[0][0] if heap else best.lower()
         lowest = min(lowest, floor)
-        answer = Minimum(lowest, best, when, heap[0][2] if heap else left, count)
+        answer = Minimum(lowest, best, when)
         if not heap or count >= largest_count or is_enough(answer) or not lowest < floor:
             return answer
         low, _, block = heapq.heappop(heap)
         if block.end - block.start <= shortest:
-            floor, left, pending = low.min(floor), block, []
+            floor, pending = low.min(floor), []
             continue
         middle = (block.start + block.end) / 2
         pending = [block._replace(end=middle), block._replace(start=middle)]

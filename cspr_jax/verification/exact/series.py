@@ -70,7 +70,7 @@ class SeriesState(NamedTuple):
 
 
 class SeriesPiece:
-    """MotionPiece of a motion that is evaluated as series.
+    """Piece of a motion that is evaluated as series.
 
     Args:
         piece: with its formulas.
@@ -80,11 +80,11 @@ class SeriesPiece:
     def __init__(self, piece: MotionPiece, index: int = 0) -> None:
         """Find the program of the piece."""
         self.index = index
-        self.formula, self.start, self.end = piece, piece.start, piece.end
+        self.start, self.end = piece.start, piece.end
         position, quaternion = piece.components
         self.program: Program = program([*position, *(quaternion or [])])
         self._is_body = quaternion is not None
-        self._coefficients: dict[int, list[list[flint.arb]]] = {}
+        self._balls: dict[int, list[tuple[str, Sequence[Any]]]] = {}
 
     def state(self, middle: flint.arb, radius: flint.arb | None = None) -> SeriesState:
         """State around a time since the start of the piece; with a radius, enclosed for all times within it."""
@@ -106,14 +106,12 @@ class SeriesPiece:
     def _steps(self) -> list[tuple[str, Sequence[Any]]]:
         # Coefficients become balls once for each precision.
         bits = flint.ctx.prec
-        if bits not in self._coefficients:
-            self._coefficients[bits] = [
-                [ball(c) for c in operands] if name == "poly" else list(operands)
+        if bits not in self._balls:
+            self._balls[bits] = [
+                (name, [ball(c) for c in operands] if name == "poly" else operands)
                 for name, operands in self.program.steps
             ]
-        return [
-            (name, operands) for (name, _), operands in zip(self.program.steps, self._coefficients[bits], strict=True)
-        ]
+        return self._balls[bits]
 
 
 def _narrowed(middle: Any, over: Any, offset: Any) -> Any:
@@ -150,9 +148,8 @@ class SeriesPieces:
     def around(self, time: Fraction) -> list[SeriesPiece]:
         """The pieces that hold a time: two where one ends and the next begins."""
         first = self.at(time)
-        index = self.formulas.index(first.formula)
-        later = self.formulas[index + 1 : index + 2]
-        return [first, *(self[index + 1] for piece in later if piece.start == time)]
+        later = self.formulas[first.index + 1 : first.index + 2]
+        return [first, *(self[first.index + 1] for piece in later if piece.start == time)]
 
     def __iter__(self) -> Iterator[SeriesPiece]:
         """All pieces."""
