@@ -21,7 +21,7 @@ from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_val
 from cspr_jax.numerics.shapes import Bool, Num
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.runtime.exact_arithmetic import has_exact
-from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.schema.verdicts import FLAGS, NO_REASON, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.criteria import levels
@@ -70,12 +70,13 @@ def _with_verdicts(answers: AnyAnswers, before: list[Verdict], is_alone: Bool[np
     # Take the verdicts of proofs where families, or bounds, leave them open or err; not where robots are uncertain.
     verdict, arcs = answers.verdict.copy(), answers.arcs.copy()
     for i, proof in enumerate(answers.proof):
-        reasons = Verdict(int(verdict[i] & ~FEWER))
+        reasons, is_claimed = Verdict(int(verdict[i])) & ~NO_REASON, not verdict[i] & ~FEWER
         if proof is None or not np.isnan(answers.tolerated[i]) or reasons not in (Verdict.UNDECIDED, before[i]):
             continue
-        if proof.is_feasible or is_alone[i] or not reasons:
-            verdict[i] = (verdict[i] & FEWER) | FLAGS(proof.verdict.value)
-            arcs[i] = answers.tried_arcs[i] if reasons and proof.is_feasible else arcs[i]
+        if proof.is_feasible and reasons:
+            verdict[i], arcs[i] = verdict[i] & FEWER, answers.tried_arcs[i]
+        elif is_claimed or (reasons and is_alone[i]):
+            verdict[i] = (verdict[i] & FLAGS(NO_REASON.value)) | FLAGS(proof.verdict.value)
     return dataclasses.replace(answers, verdict=verdict, arcs=arcs)
 
 
@@ -94,7 +95,7 @@ def attained(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
 def _sampled(problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None) -> MotionProof:
     # The proof with samples in place of upper bounds.
     proof, duration = case.proof, float(motion.duration())
-    columns = _nearest(case)
+    columns = np.flatnonzero(case.nearest)
     if proof.near is None or not len(columns) or not np.isfinite(duration):
         return case
 
@@ -112,14 +113,6 @@ def _sampled(problem: Problem, motion: Motion, case: MotionProof, scene: Scene |
     is_seen = np.isfinite(smallest) & ~((high[columns] < level) & (smallest >= level))
     high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
     return case._replace(proof=dataclasses.replace(proof, high=high, when=when))
-
-
-def _nearest(case: MotionProof) -> np.ndarray:
-    # Criteria that may have the smallest slack of all with their flag.
-    low, high = (side / case.scales for side in (case.proof.low, case.proof.high))
-    flags = np.array([row.flag.value for row in case.criteria])
-    minimum = np.array([high[flags == flag].min() for flag in flags])
-    return np.flatnonzero((low <= minimum) & np.isfinite(high))
 
 
 def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:

@@ -82,6 +82,14 @@ class MotionProof(NamedTuple):
         return near | ~((self.proof.low > level) | broken)
 
     @property
+    def nearest(self) -> Bool[np.ndarray, "n_criteria"]:
+        """Tell which criteria may have the smallest slack of all with their flag."""
+        low, high = (side / self.scales for side in (self.proof.low, self.proof.high))
+        flags = np.array([row.flag.value for row in self.criteria])
+        minimum = np.array([high[flags == flag].min() for flag in flags])
+        return (low <= minimum) & np.isfinite(high)
+
+    @property
     def verdict(self) -> Verdict:
         """Flags of the criteria that fail; without any, feasible or undecided."""
         flags = Verdict.FEASIBLE

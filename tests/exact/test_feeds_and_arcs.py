@@ -41,15 +41,27 @@ def test_feeds_beside_the_largest_speed(fraction, second):
     assert decided.verdict == (Verdict.FEASIBLE if fraction > 0.0 else Verdict.OVER_FEED)
 
 
+@pytest.mark.parametrize("none", [Verdict.FEASIBLE, Verdict.NO_ARCS])
 @pytest.mark.parametrize(
     ("tried", "arcs", "verdict"),
     [(0, None, Verdict.TOO_FAST), (7, None, Verdict.UNDECIDED), (7, 0, Verdict.UNDECIDED), (7, 7, Verdict.TOO_FAST)],
 )
-def test_one_refused_motion_refuses_no_others(tried, arcs, verdict):
+def test_one_refused_motion_refuses_no_others(tried, arcs, verdict, none):
     """Where the number of arcs is free, the motions of other numbers may be feasible."""
     case, motion = problem(Limits(speed_max=np.array(1.0))), lowered()
     answers = answers_of([proof_of(case, motion)], np.array([2.0]))
-    flags = np.array([Verdict.UNDECIDED.value], answers.verdict.dtype)
+    flags = np.array([(Verdict.UNDECIDED | none).value], answers.verdict.dtype)
     open_ones = dataclasses.replace(answers, verdict=flags, tried_arcs=np.array([tried]))
     given = None if arcs is None else np.array([arcs])
-    assert with_attained(case, open_ones, [motion], None, given).verdict.tolist() == [verdict.value]
+    assert with_attained(case, open_ones, [motion], None, given).verdict.tolist() == [(verdict | none).value]
+
+
+@pytest.mark.parametrize("none", [Verdict.FEASIBLE, Verdict.NO_ARCS])
+def test_a_feasible_motion_is_an_answer(none):
+    case, motion = problem(Limits(speed_max=np.array(100.0))), lowered()
+    answers = answers_of([proof_of(case, motion)], np.array([2.0]))
+    flags = np.array([(Verdict.UNDECIDED | none).value], answers.verdict.dtype)
+    closed = with_attained(
+        case, dataclasses.replace(answers, verdict=flags, tried_arcs=np.array([7])), [motion], None, np.array([0])
+    )
+    assert (closed.verdict.tolist(), closed.arcs.tolist()) == ([Verdict.FEASIBLE.value], [7])

@@ -38,11 +38,13 @@ SMALL = 1e-3  # quantities below this fraction of their scale get digits relativ
 
 
 def with_extremes(problem: Problem, motion: Any, case: MotionProof, scene: Scene | None, digits: int) -> MotionProof:
-    """The proof with its smallest slacks, and their times, to a number of digits of the quantities."""
+    """The proof with the smallest slacks of all flags, and their times, to a number of digits of the quantities."""
     low, high, when = (side.copy() for side in (case.proof.low, case.proof.high, case.proof.when))
     with precision(BITS):
         pieces = SeriesPieces(motion.formulas())
-        for k, function in enumerate(slack_functions(problem, scene, case.parts, case.feeds)):
+        functions = slack_functions(problem, scene, case.parts, case.feeds)
+        for k in np.flatnonzero(case.nearest).tolist():
+            function = functions[k]
             if function is None:
                 continue
             offset = case.criteria[k].allowed * (1.0 if case.criteria[k].sense == "least" else -1.0)
