@@ -160,13 +160,13 @@ def central_tensions(
 
 
 def _directions(at: Kinematics, pairs: Sequence[BodyPair], bounds: Sequence[Fraction]) -> Witness:
-    directions = [pair.direction(pair.differences_at(at)) for pair in pairs]
+    directions = [np.array([float(x) for x in pair.direction(at).axis]) for pair in pairs]
 
     def components(on: Kinematics) -> list[tuple[Component, flint.arb]]:
         return [
             (component, ball(bound))
-            for pair, (direction, _), bound in zip(pairs, directions, bounds, strict=True)
-            for component in direction_components(on, pair, direction)
+            for pair, direction, bound in zip(pairs, directions, bounds, strict=True)
+            for component in direction_components(on, pair, balls(direction))
         ]
 
-    return Witness({"directions": [texts(direction) for direction, _ in directions]}, components)
+    return Witness({"directions": [texts(direction) for direction in directions]}, components)

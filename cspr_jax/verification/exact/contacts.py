@@ -1,14 +1,14 @@
 """Clearances as series of balls, by directions: bodies are apart by what any direction separates them.
 
-A body is a convex hull of points with a radius. Every direction gives a lower bound of the distance of two bodies; the
-best one in the middle of a block errs by the square of the block's length only. Two points of the bodies bound the
-distance from above.
+A body is a convex hull of points with a radius. Every direction gives a lower bound of the distance of two bodies. That
+of the nearest points in the middle of a block turns so that all points which touch the separating planes move alike to
+first order, and errs by the square of the block's length only. Two points of the bodies bound the distance from above.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import Any, NamedTuple, cast
@@ -27,6 +27,27 @@ from cspr_jax.verification.exact.series import cross, dot, quotient, root, times
 
 Points = Callable[[Kinematics], list[list[Any]]]
 INWARD = 1e-13  # a direction leans this much out of a sector, so that rounding leaves it polar
+
+
+class SeparatingDirection(NamedTuple):
+    """Direction that separates two bodies around a time, and what is nearest then.
+
+    Fields:
+        middle: the time, s.
+        axis: (3) direction at that time, of any length.
+        rate: (3) its derivative.
+        weights: of the differences between points of the bodies; of a sector followed by coefficients of its vectors.
+    """
+
+    middle: flint.arb
+    axis: list[flint.arb]
+    rate: list[flint.arb]
+    weights: np.ndarray
+
+    def along(self, time: Any) -> list[Any]:
+        """The direction at times, as series."""
+        away = time - self.middle
+        return [x + away * y for x, y in zip(self.axis, self.rate, strict=True)]
 
 
 class BodyPair(NamedTuple):
@@ -55,15 +76,27 @@ class BodyPair(NamedTuple):
         points = itertools.product(self.first(at), self.second(at))
         return [[zero + y - x for x, y in zip(p, q, strict=True)] for p, q in points]
 
-    def differences_at(self, at: Kinematics) -> Float[np.ndarray, "m 3"]:
-        """The same vectors as floating-point numbers."""
-        return np.array([[float(x[0].mid()) for x in row] for row in self.differences(at)])
-
-    def direction(self, differences: Float[np.ndarray, "m 3"]) -> tuple[np.ndarray, np.ndarray]:
-        """Direction that separates the bodies best, and weights of the differences between their nearest points."""
+    def direction(self, at: Kinematics) -> SeparatingDirection:
+        """Direction that separates the bodies best at a time."""
+        series = self.differences(at)
+        rows, rates = (np.array([[float(x[order].mid()) for x in row] for row in series]) for order in (0, 1))
+        axis, weights = separating(rows, self.sector)
         if self.normal is not None:
-            return self.normal * (1.0 if self.normal @ differences[0] >= 0.0 else -1.0), np.ones(1)
-        return separating(differences, self.sector)
+            axis = self.normal * (1.0 if self.normal @ rows[0] >= 0.0 else -1.0)
+        if self.sector is not None or not np.isfinite(rows).all():
+            return SeparatingDirection(at.state.time[0], balls(axis), balls(np.zeros(3)), weights)
+        touching = np.flatnonzero(weights)
+        nearest = _nearest([series[k] for k in touching]) or balls(axis)
+        rate = _turning(np.array([float(x) for x in nearest]), rows[touching], rates[touching])
+        return SeparatingDirection(at.state.time[0], nearest, balls(rate), weights)
+
+    def between(self, at: Kinematics, weights: Float[np.ndarray, "k"]) -> list[Any]:
+        """Vector between two points of the bodies, from weights."""
+        rows, factors = self.differences(at), balls(weights)
+        # Dividing by the sum of the weights, 1 but for rounding, makes these points of the bodies.
+        total = sum(factors[: len(rows)], flint.arb(0))
+        rows += [] if self.sector is None else balls(-self.sector)
+        return [quotient(dot(factors, column), total) for column in zip(*rows, strict=True)]
 
 
 def contact_bodies(robot: AnyRobot, scene: Scene) -> list[BodyPair]:
@@ -96,24 +129,41 @@ def contact_functions(robot: AnyRobot, scene: Scene) -> list[Callable[[Kinematic
 
 def _components(k: int, pair: BodyPair, at: Kinematics) -> list[Component]:
     if k not in at.directions:
-        at.directions[k] = pair.direction(pair.differences_at(at))
-    direction, weights = at.directions[k]
-    below = direction_components(at, pair, direction)
-    if pair.sector is not None:
-        return below
-    factors = balls(weights)
-    between = [dot(factors, column) for column in zip(*pair.differences(at), strict=True)]
+        at.directions[k] = pair.direction(at)
+    direction: SeparatingDirection = at.directions[k]
+    between = pair.between(at, direction.weights)
     square = dot(between, between)
-    # Dividing by the sum of the weights, 1 but for rounding, makes this the distance of two points of the bodies.
-    distance = quotient(root(square), sum(factors)) - flint.arb(pair.radius)
-    return [*below, Component(distance, at.is_point and bool(square[0] > 0))]
+    distance = Component(root(square) - flint.arb(pair.radius), at.is_point and bool(square[0] > 0))
+    return [*direction_components(at, pair, direction.along(at.state.time)), distance]
 
 
-def direction_components(at: Kinematics, pair: BodyPair, direction: Float[np.ndarray, "3"]) -> list[Component]:
+def direction_components(at: Kinematics, pair: BodyPair, direction: Sequence[Any]) -> list[Component]:
     """Components of the clearance of two bodies along a direction, which bound it from below."""
-    unit, radius = balls(direction), flint.arb(pair.radius)
-    length = dot(unit, unit).sqrt()
-    return [Component(dot(unit, row) / length - radius, None) for row in pair.differences(at)]
+    zero = at.state.position[0] * 0
+    axis, radius = [zero + x for x in direction], flint.arb(pair.radius)
+    length = root(dot(axis, axis))
+    return [Component(quotient(dot(axis, row), length) - radius, None) for row in pair.differences(at)]
+
+
+def _nearest(rows: list[list[Any]]) -> list[flint.arb] | None:
+    # The point of the plane through some points that is nearest to the origin; None where they span none.
+    count = len(rows)
+    points = flint.arb_mat([[x[0].mid() for x in row] for row in rows])
+    products = (points * points.transpose()).tolist()
+    matrix = [[*row, flint.arb(1)] for row in products] + [[flint.arb(1)] * count + [flint.arb(0)]]
+    try:
+        weights = flint.arb_mat(matrix).solve(flint.arb_mat([[flint.arb(int(k == count))] for k in range(count + 1)]))
+    except ZeroDivisionError:
+        return None
+    factors = flint.arb_mat([[weights[k, 0].mid() for k in range(count)]])
+    return [x.mid() for x in (factors * points).entries()]
+
+
+def _turning(axis: np.ndarray, rows: Float[np.ndarray, "m 3"], rates: Float[np.ndarray, "m 3"]) -> np.ndarray:
+    # Derivative of a direction along which differences that are equally long now change alike.
+    matrix = np.vstack([np.column_stack([rows, -np.ones(len(rows))]), np.append(axis, 0.0)])
+    scale = np.append(np.full(3, 1.0 / (np.abs(rows).max() or 1.0)), 1.0)
+    return (np.linalg.lstsq(matrix * scale, np.append(-rates @ axis, 0.0), rcond=None)[0] * scale)[:3]
 
 
 def separating(
@@ -123,12 +173,13 @@ def separating(
     from scipy.optimize import nnls  # few checks need it
 
     if not np.isfinite(differences).all():  # no direction is better than another
-        return np.array([0.0, 0.0, 1.0]), np.full(len(differences), 1.0 / len(differences))
+        weights = np.full(len(differences), 1.0 / len(differences))
+        return np.array([0.0, 0.0, 1.0]), np.append(weights, np.zeros(0 if sector is None else len(sector)))
     if sector is not None:
         fractions = nnls(sector.T, differences[0])[0]
         direction = differences[0] - sector.T @ fractions
         lean = INWARD * np.linalg.norm(direction) * (sector / np.linalg.norm(sector, axis=1)[:, None]).sum(0)
-        return direction - lean, np.ones(1)
+        return direction - lean, np.append(1.0, fractions)
     scale = float(np.abs(differences).max())
     rows = np.vstack([differences.T / scale, np.ones(len(differences))])
     weights = nnls(rows, np.array([0.0, 0.0, 0.0, 1.0]))[0]
