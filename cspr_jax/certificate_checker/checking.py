@@ -9,7 +9,7 @@ from typing import Any
 
 from flint import arb, ctx, fmpq
 
-from cspr_jax.certificate_checker.criteria import Criterion, criteria, hull, margins
+from cspr_jax.certificate_checker.criteria import Criterion, criteria, crossings, hull, margins
 from cspr_jax.certificate_checker.reading import Fields, check_order, parse, read_statement, refuse
 from cspr_jax.certificate_checker.series import ORDER, Undefined, dot, plus, tight
 from cspr_jax.certificate_checker.state import State
@@ -34,8 +34,7 @@ def check(content: Any) -> Finding:
     try:
         with ctx.workprec(512):
             case = read_statement(content)
-            named = dict(criteria(case))
-            message, doubts = (_feasible if feasible else _infeasible)(content, case, named)
+            message, doubts = (_feasible if feasible else _infeasible)(content, case, dict(criteria(case)))
             doubt = next(chain(_gaps(case), doubts), "")
     finally:
         ctx.cap = cap
@@ -71,10 +70,9 @@ def _infeasible(content: Fields, case: Fields, named: dict[str, Criterion]) -> t
     texts = [f"{failure['criterion']} at {float(arb(failure['time'])):g} s" for failure in failures]
     defined, pieces = ("that it is defined", Criterion(0, 0, lambda _: []), 0), case["pieces"]
     doubts = (_doubts(case, piece, piece, [defined], f"motion.pieces[{k}]") for k, piece in enumerate(pieces))
-    real = (any(_fails(case, piece, entry, named[entry["criterion"]]) for piece in pieces) for entry in failures)
+    real = (any(_fails(case, piece, entry) for piece in entry["pieces"]) for entry in failures)
     unreal = (f"{text} is not shown" for text, is_real in zip(texts, real, strict=True) if not is_real)
-    message = f"fails: {', '.join(texts[:8])}{', ...' * (len(texts) > 8)}"
-    return message, chain(chain.from_iterable(doubts), unreal)
+    return f"fails: {', '.join(texts[:8])}{', ...' * (len(texts) > 8)}", chain(chain.from_iterable(doubts), unreal)
 
 
 def _gaps(case: Fields) -> Iterator[str]:
@@ -82,11 +80,10 @@ def _gaps(case: Fields) -> Iterator[str]:
     for k, (one, two) in enumerate(pairwise(case["pieces"])):
         try:
             first, second = (State(case["robot"], piece, piece, two["start"], fmpq(0)) for piece in (one, two))
-            turns = [a - b for a, b in zip(chain(*first.rotation), chain(*second.rotation), strict=True)]
-            gaps = [[entry] for turn in turns for entry in (turn, turn.derivative() * SAME_TIME)]
-            gaps += [plus(first.position, second.position, -1)]
-            gaps += [[entry * SAME_TIME for entry in plus(first.velocity, second.velocity, -1)]]
-            if not all(dot(gap, gap)[0] <= SAME**2 for gap in gaps):
+            turns = zip(chain(*first.rotation), chain(*second.rotation), strict=True)
+            jumps = [plus(first.position, second.position, -1), *([a - b] for a, b in turns)]
+            rates = [[entry.derivative() * SAME_TIME for entry in jump] for jump in jumps]
+            if not all(dot(gap, gap)[0] <= SAME**2 for gap in jumps + rates):
                 yield f"motion.pieces[{k}] and the next do not meet"
         except Undefined:
             yield f"motion.pieces[{k}] or the next is not defined where they meet"
@@ -126,34 +123,45 @@ def _shown(state: State, criterion: Criterion, bound: Any) -> bool:
 
 def _failure(case: Fields, named: dict[str, Criterion], value: Any, key: str, sizes: dict[str, int]) -> Fields:
     """Read a failure with its witness."""
-    name = value.get("criterion") if isinstance(value, dict) else None
+    name: Any = value.get("criterion") if isinstance(value, dict) else None
     refuse(not isinstance(name, str) or name not in named, f"{key}.criterion: none of this statement")
-    pair = case["pairs"][int(str(name)[8:])] if str(name).startswith("contact:") else []
-    table: Fields = {"criterion": "text", "time": "number"} | ({"points": ("nonnegative +", "2")} if pair else {})
+    pair = case["pairs"][int(name[8:])] if name.startswith("contact:") else []
+    contact = {"until": "number"} if "until" in value else {"points": ("nonnegative +", "2")}
+    table: Fields = {"criterion": "text", "time": "number"} | (contact if pair else {})
     failure = parse(value, table | ({"wrench": "number d"} if name == "wrench_infeasible" else {}), key, sizes)
-    refuse(not 0 <= failure["time"] <= case["duration"], f"{key}.time: not in the motion")
-    return {**failure, "pair": pair}
+    start, end = failure["time"], failure.get("until", failure["time"])
+    pieces = [piece for piece in case["pieces"] if piece["start"] <= start <= end <= piece["end"]]
+    refuse(not pieces, f"{key}: not in the motion, or not within one piece")
+    segments = (len(body.get("points", [])) == 2 or (body["kind"] == "cable" and not body["turns"]) for body in pair)
+    right = all(segments) or {body["kind"] for body in pair} == {"cone", "spool"}
+    refuse("until" in failure and not (start < end and right), f"{key}.until: too early, or of other bodies")
+    return {**failure, "start": start, "end": end, "pieces": pieces, "named": named[name], "pair": pair}
 
 
-def _fails(case: Fields, piece: Fields, failure: Fields, criterion: Criterion) -> bool:
-    """Say that balls show a slack in a piece to be less than minus its allowance."""
-    time, allowance, limits = failure["time"], arb(criterion.allowance_squared).sqrt(), case["limits"]
-    if not piece["start"] <= time <= piece["end"]:
-        return False
+def _fails(case: Fields, piece: Fields, failure: Fields) -> bool:
+    """Say that balls show a slack in a piece to be less than minus its allowance, or bodies to touch in between."""
+    allowance, pair, limits = arb(failure["named"].allowance_squared).sqrt(), failure["pair"], case["limits"]
     try:
-        state = State(case["robot"], piece, piece, time, fmpq(0))
-        if "points" in failure:
+        state, last = (State(case["robot"], piece, piece, failure[key], fmpq(0)) for key in ("start", "end"))
+        if "until" in failure:
+            for k, (before, after) in enumerate(zip(crossings(state, pair), crossings(last, pair), strict=True)):
+                touching = Criterion(0, 0, partial(lambda s, k: list(crossings(s, pair))[k][1:], k=k))
+                sides = pair[0]["flat"] or before[0][0] * after[0][0] < 0
+                if sides and not any(_doubts(case, piece, failure, [("", touching, 0)], "")):
+                    return True
+            return False
+        if pair:
             ends = []
-            for body, stated in zip(failure["pair"], failure["points"], strict=True):
+            for body, stated in zip(pair, failure["points"], strict=True):
                 points, cone = hull(state, body), body["kind"] == "cone"
                 weights = [fmpq(1), *stated] if cone else stated
-                wrong = len(points) != len(weights) or not (cone or sum(stated) == 1)
-                refuse(wrong, "failures: points: not a weight for each point, or their sum is not 1")
+                right = len(points) == len(weights) and (cone or sum(stated) == 1)
+                refuse(not right, "failures: points: not a weight for each point, or their sum is not 1")
                 ends.append([dot(weights, column) for column in zip(*points, strict=True)])
             gap = plus(ends[0], ends[1], -1)
-            return bool(dot(gap, gap)[0] < sum(body["radius"] for body in failure["pair"]) ** 2)
+            return bool(dot(gap, gap)[0] < sum(body["radius"] for body in pair) ** 2)
         if "wrench" not in failure:
-            return any(margin[0] < 0 for margin in margins(criterion, state, -allowance))
+            return any(margin[0] < 0 for margin in margins(failure["named"], state, -allowance))
         y, largest = failure["wrench"], arb(0)  # by Farkas' lemma
         highest = limits.get("tension_max", [arb.pos_inf()] * case["sizes"]["n"])
         for i, (low, high) in enumerate(zip(limits["tension_min"], highest, strict=True)):

@@ -3,12 +3,13 @@
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import combinations
 from typing import Any
 
 from flint import arb, arb_series, fmpq, fmpq_mat
 
 from cspr_jax.certificate_checker.reading import FLAGS, MOTORS, Fields, refuse
-from cspr_jax.certificate_checker.series import Undefined, dot, plus
+from cspr_jax.certificate_checker.series import Undefined, cross, dot, plus
 from cspr_jax.certificate_checker.state import State
 
 SINGULAR, STANDSTILL = fmpq(1, 10**9), fmpq(1, 10**6)  # smallest normalised determinant; speed of a motor, rad/s
@@ -111,7 +112,7 @@ PER_EFFECTOR: list[tuple[str, str, bool, Callable[[State], list[Any]], bool]] = 
 def hull(state: State, body: Fields) -> list[list[Any]]:
     """Return the points whose convex hull a body is, in the order of the page, m; of a cone the corner and the rays."""
     if body["kind"] in ("points", "body"):
-        return list(body["points"]) if body["kind"] == "points" else state.corners
+        return [[arb_series([entry]) for entry in point] for point in body.get("points", [])] or state.corners
     if body["kind"] == "cone":
         return [plus(state.position, state.turn(body["corner"])), *map(state.turn, body["cone"])]
     cable, end = state.cables[body[body["kind"]]], state.attachments[body[body["kind"]]]
@@ -119,7 +120,19 @@ def hull(state: State, body: Fields) -> list[list[Any]]:
         if not cable.free[0] > body["leave"]:
             raise Undefined("nothing is left of a cable")
         end = plus(end, cable.unit, body["leave"])
-    return [cable.leaving] if body["kind"] == "spool" else [cable.leaving, end]
+    points = [cable.leaving] if body["kind"] == "spool" else [cable.leaving, end]
+    return [[x, y * (0 if body["flat"] else 1), z] for x, y, z in points]
+
+
+def crossings(state: State, pair: list[Fields]) -> Iterator[list[Any]]:
+    """List what is zero where two segments, or a cone and a spool, may touch, then what is negative if they then do."""
+    (p, *first), (q, *second) = sorted((hull(state, body) for body in pair), key=len, reverse=True)
+    r = plus(q, p, -1)
+    for a, b in [(plus(first[0], p, -1), plus(q, second[0], -1))] if second else combinations(first, 2):
+        normal = cross(a, b)
+        coordinates = [dot(cross(r, b), normal), dot(cross(a, r), normal)]  # r = s a + t b + ..., s and t times N . N
+        beyond = [coordinate - dot(normal, normal) for coordinate in coordinates if second]
+        yield [dot(r, normal), *(-coordinate for coordinate in coordinates), *beyond]
 
 
 def _contact(state: State, pair: list[Fields], k: int) -> list[Any]:
@@ -128,11 +141,9 @@ def _contact(state: State, pair: list[Fields], k: int) -> list[Any]:
     sides = [dot(axis, ray) * side for body, side in zip(pair, (-1, 1), strict=True) for ray in body.get("cone", [])]
     if any(side < 0 for side in sides):
         raise Undefined("a cone crosses the plane between the bodies")
-    norm = arb(dot(axis, axis)).sqrt()
-    unit = [entry / norm for entry in axis]
+    unit = [entry / arb(dot(axis, axis)).sqrt() for entry in axis]
     if any(body["turns"] for body in pair):
         unit = state.turn(unit)
     points = (hull(state, body)[: 1 if "cone" in body else None] for body in pair)
     first, second = ([dot(unit, point) for point in hull] for hull in points)
-    radii = arb_series([arb(pair[0]["radius"] + pair[1]["radius"])])
-    return [radii + before - beyond for beyond in second for before in first]
+    return [pair[0]["radius"] + pair[1]["radius"] + before - beyond for beyond in second for before in first]

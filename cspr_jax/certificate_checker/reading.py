@@ -92,8 +92,8 @@ def parse(value: Any, table: Any, key: str, sizes: dict[str, int]) -> Any:
         refuse(not isinstance(value, dict), f"{key}: no JSON object")
         entries = {name.rstrip("?"): entry for name, entry in table.items()}
         for name in [*(name for name in table if name[-1] != "?"), *value]:
-            if name not in value or name not in entries:
-                raise NotACertificate(f"{key}: key {str(name)[:40]!a} is missing, unknown or of no use here")
+            wrong = name not in value or name not in entries
+            refuse(wrong, f"{key}: key {str(name)[:40]!a} is missing, unknown or of no use here")
         return {name: parse(entry, entries[name], f"{key}.{name}", sizes) for name, entry in value.items()}
     if isinstance(table, str) and " " in table:
         kind, length, *rest = table.split()
@@ -108,8 +108,7 @@ def parse(value: Any, table: Any, key: str, sizes: dict[str, int]) -> Any:
         return table(value, key, sizes)
     if table in ("number", "positive", "nonnegative", "share"):
         value = _number(value, key)
-        signs = {"positive": value > 0, "nonnegative": value >= 0, "share": 0 < value <= 1}
-        right = signs.get(table, True)
+        right = {"positive": value > 0, "nonnegative": value >= 0, "share": 0 < value <= 1}.get(table, True)
     elif table[0] == "<":
         right = type(value) is int and 0 <= value < sizes[table[1:]]
     else:
@@ -147,12 +146,14 @@ def read_statement(content: Fields) -> Fields:
         refuse(mistake, f"robot: {message}")
     hull = {"body?": {"corners": "number + 3"}} if body else {}
     scene = parse(content.get("scene", {"pairs": []}), {"pairs": ((_body, "2"), "*"), **hull}, "scene", sizes)
+    for one, two in scene["pairs"]:
+        one["flat"] = two["flat"] = robot["forces"] == [0, 2] and one["kind"] == two["kind"] == "cable"
     kinds = {entry["kind"] for pair in scene["pairs"] for entry in pair}
     refuse(("cone" in kinds and not body) or ("body" in kinds and "body" not in scene), "scene.pairs: no such body")
     motion = parse(content["motion"], {"duration": "positive", "pieces": (_piece, "+")}, "motion", sizes)
     check_order(motion["pieces"], "motion.pieces", motion["duration"])
     limits = {"tension_min": [fmpq(0)] * sizes["n"], **limits, "touched": limits.get("touched", fmpq(0))}
-    sizes["corners"] = len(robot.setdefault("corners", scene.get("body", {}).get("corners", [])))
+    robot["corners"] = scene.get("body", {}).get("corners", [])
     return {"robot": robot, "limits": limits, "pairs": scene["pairs"], **motion, "sizes": sizes}
 
 

@@ -18,7 +18,7 @@ def cable(base: list[Any], point: list[Any], r: Any, axis: list[Any]) -> Cable:
     if not r > 0:
         length = apply("sqrt", dot(v, v))
         inverse = -apply("inv", length)
-        return Cable(base, [entry * inverse for entry in v], length, length)
+        return Cable([arb_series([entry]) for entry in base], [entry * inverse for entry in v], length, length)
     k = [entry / arb(dot(axis, axis)).sqrt() for entry in axis]
     h = dot(v, k)
     side = plus(v, k, -h)
@@ -107,13 +107,12 @@ class State:
     @cached_property
     def tensions(self) -> list[Any]:
         """Return tensions f with A f = W, N: f = g + B z with (A B) z = W - A g, g the witness or zero."""
-        right, guess, (b, products), d = self.wrench, [], self.inverse, len(self.wrench)
-        if "tensions" in self.block:
-            guess = plus(self.block["tensions"][0], [self.time * rate for rate in self.block["tensions"][1]])
-            right = plus(right, [dot(self.columns[k::d], guess) for k in range(d)], -1)
+        (b, products), d = self.inverse, len(self.wrench)
+        first, rates = self.block.get("tensions", [[0] * len(self.cables)] * 2)
+        guess = plus(first, [self.time * rate for rate in rates])
+        right = plus(self.wrench, [dot(self.columns[k::d], guess) for k in range(d)], -1)
         rest = zip(*((b * z).entries() for z in _solve(products, _coefficients(right, d))), strict=True)
-        tensions = [arb_series(list(entry), ORDER - 2) for entry in rest]
-        return plus(tensions, guess) if guess else tensions
+        return plus([arb_series(list(entry), ORDER - 2) for entry in rest], guess)
 
     @cached_property
     def determinant(self) -> Any:

@@ -306,6 +306,25 @@ def test_cone_failure():
         verify(infeasible(content, failure | {"points": [["-2", "3"], ["1"]]}))
 
 
+def test_failure_of_bodies_at_rest():
+    """Whether fixed bodies and spools touch, for which no series is needed."""
+    content, _, _ = point_mass()
+    content["limits"] = {}
+    spool, ball = {"spool": 0, "radius": "0.5"}, {"points": [text(SPOOLS[0]), ["-2", "-1.2", "0.9"]], "radius": "0.25"}
+    other, far = {"points": [["-2", "-1.2", "1.3"]], "radius": "0.25"}, {"spool": 1, "radius": "3.6"}
+    for pair, points, touches in [
+        ([spool, ball], [["1"], ["0.26", "0.74"]], True),  # 0.74 m apart
+        ([spool, ball], [["1"], ["0.24", "0.76"]], False),
+        ([ball, other], [["0.09", "0.91"], ["1"]], True),  # 0.49 m apart
+        ([ball, other], [["0.11", "0.89"], ["1"]], False),
+        ([spool, far], [["1"], ["1"]], False),  # 4.106 m apart
+        ([spool, far | {"radius": "3.61"}], [["1"], ["1"]], True),
+    ]:
+        content["scene"] = {"pairs": [pair]}
+        failure = {"criterion": "contact:0", "time": "0.5", "points": points}
+        assert verify(infeasible(content, failure)) is touches, (pair, points)
+
+
 def test_leaving_point_of_pulley():
     """The cable runs from where it leaves its pulley, and there the body of its spool is."""
     content, oracle, _ = point_mass(pulleys=True)

@@ -12,6 +12,7 @@ import numpy as np
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.shapes import Float
 from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.certificates.blocks import CONTACTS
@@ -19,14 +20,16 @@ from cspr_jax.verification.certificates.statement import NoCertificateError, tex
 from cspr_jax.verification.criteria import Criterion
 from cspr_jax.verification.exact.contacts import BodyPair, contact_bodies
 from cspr_jax.verification.exact.decisions import blocks_of, components_of
-from cspr_jax.verification.exact.kinematics import Kinematics
+from cspr_jax.verification.exact.kinematics import Kinematics, balls
 from cspr_jax.verification.exact.minimum import Components, Minimum, attained, minimum
-from cspr_jax.verification.exact.series import SeriesPiece, SeriesPieces, ball
+from cspr_jax.verification.exact.series import SeriesPiece, SeriesPieces, ball, cross, dot
 from cspr_jax.verification.exact.slacks import SlackFunction
 
 BESIDE = 1e-6  # s; times this near to the worst one are searched where floating-point numbers are too coarse
 MOST_BLOCKS = 2_000
 FLAT = 1e-12  # a cable that pulls less along a normal, over what it could, spans the facet
+CROSSING = (-32, -2)  # exponents of 2 s before and after the crossing of bodies without thickness
+SEGMENTS = 4  # differences of the ends of two segments
 LEANING = 1e-11  # normals lean this much away from cables without a largest tension
 
 
@@ -44,7 +47,7 @@ def failure(
     """Failure of a criterion near a time, in the form of the file.
 
     Raises:
-        NoCertificateError: the failure cannot be shown at one time, as where cables without thickness cross.
+        NoCertificateError: the failure cannot be shown, as that of a cable that just loses its tension.
     """
     row, name, function = slack
     if function is None:
@@ -60,15 +63,59 @@ def failure(
 
         time = minimum(components, blocks_of(pieces, around), is_enough, MOST_BLOCKS).when
         piece = _failing_piece(components, pieces, time, level)
+    pair = contact_bodies(problem.robot, scene)[int(name.partition(":")[2])] if row.flag in CONTACTS and scene else None
+    if piece is None and pair is not None:
+        return {"criterion": name} | _crossing(problem, pieces, pair, near)
     if piece is None:
         raise NoCertificateError(f"a certificate cannot show {row.flag.text.replace('_', ' ')} at a single time")
     content: dict[str, Any] = {"criterion": name, "time": str(time)}
     at = Kinematics(problem.robot, piece.state(ball(time - piece.start)))
     if row.flag == Verdict.WRENCH_INFEASIBLE:
         content["wrench"] = texts(_separating_wrench(problem, at, row.allowance))
-    if row.flag in CONTACTS and scene is not None:
-        content["points"] = _weights(at, contact_bodies(problem.robot, scene)[int(name.partition(":")[2])])
-    return content
+    return content if pair is None else content | {"points": _weights(at, pair)}
+
+
+def _crossing(problem: Problem, pieces: SeriesPieces, pair: BodyPair, near: float) -> dict[str, str]:
+    # Times between which bodies without thickness pass through each other, as near to each other as that shows.
+    time, robot = Fraction(near), problem.robot
+    in_plane = PATTERNS[robot.pattern].is_planar
+    for piece, exponent in itertools.product(pieces.around(time), range(*CROSSING)):
+        away = Fraction(2) ** exponent
+        start, end = max(time - away, piece.start), min(time + away, piece.end)
+        middle, radius = (start + end) / 2 - piece.start, (end - start) / 2
+        over = _crossings(pair, Kinematics(robot, piece.state(ball(middle), ball(radius)), is_point=False))
+        first, last = (_crossings(pair, Kinematics(robot, piece.state(ball(t - piece.start)))) for t in (start, end))
+        for one, two, between in zip(first, last, over, strict=True):
+            if between.is_within and (in_plane or one.volume * two.volume < 0):
+                return {"time": str(start), "until": str(end)}
+    raise NoCertificateError("a certificate cannot show bodies that touch at a single time without crossing")
+
+
+class Crossing(NamedTuple):
+    """Volume that two bodies without thickness span, zero where they meet if they are within each other's reach."""
+
+    volume: flint.arb
+    is_within: bool
+
+
+def _crossings(pair: BodyPair, at: Kinematics) -> list[Crossing]:
+    # One of two segments; of a sector and a spool one for each two vectors of the sector.
+    rows = [[x[0] for x in row] for row in pair.differences(at)]
+    if pair.sector is not None:
+        cones = itertools.combinations(balls(pair.sector), 2)
+        return [_crossing_of(rows[0], first, second, is_cone=True) for first, second in cones]
+    if len(rows) != SEGMENTS or pair.in_platform_axes:
+        return []
+    across, beyond, back, _ = rows  # start to start, start to end, end to start
+    first, second = ([x - y for x, y in zip(*ends, strict=True)] for ends in ((across, back), (beyond, across)))
+    return [_crossing_of(across, first, second, is_cone=False)]
+
+
+def _crossing_of(across: list[flint.arb], first: Any, second: Any, *, is_cone: bool) -> Crossing:
+    normal = cross(first, second)
+    parts = [dot(cross(across, second), normal), dot(cross(across, first), normal) * (-1 if is_cone else 1)]
+    square = flint.arb("inf") if is_cone else dot(normal, normal)
+    return Crossing(dot(across, normal), all(part > 0 and part < square for part in parts))
 
 
 def _failing_piece(
@@ -114,8 +161,7 @@ def _leaning(columns: Float[np.ndarray, "m d"]) -> Float[np.ndarray, "d"]:
 
 def _weights(at: Kinematics, pair: BodyPair) -> list[list[str]]:
     # Weights of the points of both bodies at their nearest points.
-    _, weights = pair.direction(pair.differences_at(at))
-    table = weights.reshape(len(pair.first(at)), len(pair.second(at)))
+    table = pair.direction(at).weights.reshape(len(pair.first(at)), len(pair.second(at)))
     return [_normalised(table.sum(1)), _normalised(table.sum(0))]
 
 
