@@ -31,6 +31,8 @@ BRACKET = fmpq(1, 1 << 80)
 CORNER_BRACKET = fmpq(1, 1 << 130)
 GOLDEN = fmpq(1836311903, 2971215073)
 ALLOWANCE = 1e-8
+# Terms of series of which the rest is below the width of balls: at 0.1, and at 4 half turns.
+ARCSINE_TERMS, COSINE_TERMS = 100, 80
 LIMIT_OF = {
     "tension": "tension_max",
     "least tension": "tension_min",
@@ -547,20 +549,30 @@ class Formula:
         start: time at which it starts, s.
         width: duration, s.
         position: position (3) as power series in time from time after the start of the motion, as a power series.
+        quaternion: likewise a unit quaternion (4); None for a point mass.
     """
 
     start: fmpq
     width: fmpq
     position: Callable
+    quaternion: Callable | None = None
 
     def state(self, u: fmpq) -> State:
         """State at a time after its start, in balls of the precision that is set."""
         cap, flint.ctx.cap = flint.ctx.cap, 3
         try:
-            jets = [arb_series(x) for x in self.position(arb_series([arb(self.start + u), 1]))]
-            return State([x[0] for x in jets], [x[1] for x in jets], [2 * x[2] for x in jets])
+            time = arb_series([arb(self.start + u), 1])
+            position = _derivatives(self.position(time))
+            if self.quaternion is None:
+                return State(*position)
+            return State(*position, *rotation_of(*_derivatives(self.quaternion(time))))
         finally:
             flint.ctx.cap = cap
+
+
+def _derivatives(series):
+    series = [arb_series(x) for x in series]
+    return [[math.factorial(k) * x[k] for x in series] for k in range(3)]
 
 
 def law_polynomials(law) -> list:
@@ -587,25 +599,33 @@ def formulas_of(motion) -> list[Formula]:
         full = inner[-1].start + inner[-1].width
 
         def reverse(formula):
-            return Formula(
-                full - formula.start - formula.width, formula.width, lambda t: formula.position(arb(full) - t)
-            )
+            curves = [
+                curve and (lambda t, curve=curve: curve(arb(full) - t))
+                for curve in (formula.position, formula.quaternion)
+            ]
+            return Formula(full - formula.start - formula.width, formula.width, *curves)
 
         return [reverse(formula) for formula in reversed(inner)]
     duration = rational(motion.duration())
     if kind == "Bezier":
         return [Formula(fmpq(0), duration, functools.partial(bezier_position, motion, duration))]
-    law = {"EllipseMotion": "law", "Hypocycloid": "amplitude", "TimedLine": "law"}[kind]
-    position = {"EllipseMotion": ellipse_position, "Hypocycloid": swing_position, "TimedLine": line_position}[kind]
+    law, *functions = {
+        "EllipseMotion": ("law", ellipse_position),
+        "Hypocycloid": ("amplitude", swing_position),
+        "TimedLine": ("law", line_position),
+        "PlatformMotion": ("amplitude", platform_position, platform_quaternion),
+    }[kind]
     formulas = []
     for i, (first, last, *_) in enumerate(law_polynomials(getattr(motion, law))):
-        curve = functools.partial(position, motion, duration, i)
-        formulas.append(Formula(first * duration, (last - first) * duration, curve))
+        curves = [functools.partial(function, motion, duration, i) for function in functions]
+        formulas.append(Formula(first * duration, (last - first) * duration, *curves))
     return formulas
 
 
-def _law(law, index: int, tau):
+def _law(law, index: int, tau, order: int = 0):
     _, _, origin, coefficients = law_polynomials(law)[index]
+    for _ in range(order):
+        coefficients = [k * c for k, c in enumerate(coefficients)][1:]
     return horner(coefficients, tau - arb(origin))
 
 
@@ -639,8 +659,11 @@ def ellipse_position(motion, duration: fmpq, index: int, t):
     return position
 
 
-def swing_position(motion, duration: fmpq, index: int, t):
-    """Precessing ellipse: r (C e_r + nu S e_t), C and S of the phase p pi tau, the axes turned by delta tau."""
+def swing_position(motion, duration: fmpq, index: int, t, is_variable: bool = False):
+    """Precessing ellipse: r (C e_r + nu S e_t), C and S of the phase p pi tau, the axes turned by delta tau.
+
+    Of variable amplitude, thesis (3.44), it has the part -r' S / (p pi) e_r as well.
+    """
     segment, tau = motion.segment, t / arb(duration)
     arcs, sense = arb(rational(motion.arcs)), arb(rational(segment.sense))
     first, last = (arb(rational(x)) for x in (segment.start_radius, segment.end_radius))
@@ -648,10 +671,67 @@ def swing_position(motion, duration: fmpq, index: int, t):
     r = first + (last - first) * _law(motion.amplitude, index, tau)
     phase, turn = tau * (sense * arcs), tau * (sense * precession)
     along, across = r * phase.cos_pi(), r * phase.sin_pi() * (precession / arcs)
+    if is_variable:
+        slope = (last - first) * _law(motion.amplitude, index, tau, 1)
+        along = along - slope * phase.sin_pi() / (sense * arcs * arb.pi())
     x = turn.cos_pi() * along + turn.sin_pi() * across
     y = turn.cos_pi() * across - turn.sin_pi() * along
     rows = zip(rationals(segment.center), rationals(segment.plane), strict=True)
     return [arb(c) + arb(q1) * x + arb(q2) * y for c, (q1, q2) in rows]
+
+
+def platform_position(motion, duration: fmpq, index: int, t):
+    """Swing of the mass centre of a platform."""
+    return swing_position(motion, duration, index, t, motion.kind.variable)
+
+
+def platform_quaternion(motion, duration: fmpq, index: int, t):
+    """Oscillating SLERP, thesis (3.58) to (3.65): exp(beta u), u half of the rotation vector of the envelope."""
+    slerp, tau = motion.segment.slerp, t / arb(duration)
+    angle = arb(rational(slerp.angle)) * _law(motion.amplitude, index, tau)
+    cosine, sine = angle.cos(), angle.sin()
+    rows = zip(rationals(slerp.start), rationals(slerp.across), strict=True)
+    vector = half_rotation_vector([arb(a) * cosine + arb(b) * sine for a, b in rows])
+    return exponential(times(rotation_law(motion, tau), vector))
+
+
+def rotation_law(motion, tau):
+    """beta_ff of the thesis (3.93), where beta'' at the ends is beta-hat (p pi)^2 (1 - nu^2); or beta_1 (3.66)."""
+    slerp, arcs = motion.segment.slerp, rational(motion.arcs)
+    once, thrice = (tau * arb(arcs)).cos_pi(), (tau * arb(3 * arcs)).cos_pi()
+    if motion.kind.plain:
+        return once
+    fraction = 1 - (rational(motion.segment.precession) / arcs) ** 2
+    first, last = (rational(x) * fraction for x in (slerp.start_beta_hat, slerp.end_beta_hat))
+    bend = arb(first) + arb(last - first) * tau
+    return ((9 + bend) * once - (1 + bend) * thrice) / 8
+
+
+def half_rotation_vector(quaternion):
+    """Half of the rotation vector of a quaternion of any norm with a scalar part that is not negative."""
+    scalar, vector = quaternion[0], quaternion[1:]
+    norm, size = dot(quaternion, quaternion), dot(vector, vector)
+    square = size / norm
+    if square[0] < 0.1:  # by the series of arcsin, which is regular at zero, to more digits than balls have
+        ratio = horner(_series_balls("arcsine", flint.ctx.prec), square)
+        return times(ratio / norm.sqrt(), vector)
+    size = size.sqrt()
+    return times(2 * (size / (norm.sqrt() + scalar)).atan() / size, vector)
+
+
+def exponential(vector):
+    """Unit quaternion of half of a rotation vector, by series, to more digits than balls have."""
+    square = -dot(vector, vector)
+    cosine, ratio = (horner(_series_balls(name, flint.ctx.prec), square) for name in ("cosine", "sine"))
+    return [cosine, *times(ratio, vector)]
+
+
+@functools.cache
+def _series_balls(name: str, _: int) -> list[arb]:
+    # Coefficients of arcsin(x) / x by x^2, and of cos(x) and sin(x) / x by -x^2, in balls of the precision that is set.
+    if name == "arcsine":
+        return [arb(fmpq(math.comb(2 * k, k), 4**k * (2 * k + 1))) for k in range(ARCSINE_TERMS)]
+    return [1 / arb(math.factorial(2 * k + (name == "sine"))) for k in range(COSINE_TERMS)]
 
 
 def formula_extreme(robot: Robot, formulas: list[Formula], quantity: str, cable: int = 0, count: int = 200) -> Extreme:
