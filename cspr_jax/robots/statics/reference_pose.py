@@ -73,8 +73,8 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3
         rotation = _level_and_straight(robot)
         if np.abs(rotation - np.eye(3)).max() < ALIGNED:
             rotation = np.eye(3)
-    points, turned = as_float64(robot.platform_points) @ rotation.T, rotation @ as_float64(robot.inertia) @ rotation.T
-    inertia = 0.5 * (turned + turned.T)  # rounding leaves it almost symmetric
+    points, inertia = as_float64(robot.platform_points) @ rotation.T, rotation @ as_float64(robot.inertia) @ rotation.T
+    inertia = 0.5 * (inertia + inertia.T)  # rounding leaves it almost symmetric
     centre = None if robot.centre_of_mass is None else as_float64(as_float64(robot.centre_of_mass) @ rotation.T)
     rotated = dataclasses.replace(
         robot, platform_points=as_float64(points), inertia=as_float64(inertia), centre_of_mass=centre
