@@ -3,6 +3,7 @@
 import itertools
 from fractions import Fraction
 
+import flint
 import numpy as np
 import pytest
 from oracles import exact_motions as oracle
@@ -45,12 +46,13 @@ def smallest_distance(robot, pieces, segments, count=24):
 
 def wrong_verdicts(checked, square, flag):
     """What is wrong with verdicts on sums of radii near the square of a distance."""
-    for share in SHARES:
-        reach = float(square) ** 0.5 * (1.0 + share)
+    distance = float(flint.arb(square).sqrt())
+    nearest = [np.nextafter(distance, 0.0), distance, np.nextafter(distance, 1.0)]
+    for reach in [*(distance * (1.0 + share) for share in SHARES), *map(float, nearest)]:
         expected = "feasible" if Fraction(reach) ** 2 < Fraction(int(square.p), int(square.q)) else flag
         verdict = checked(reach)
         if verdict != expected:
-            yield {"share": share, "reach": reach, "verdict": verdict, "expected": expected}
+            yield {"reach": reach, "distance": distance, "verdict": verdict, "expected": expected}
 
 
 def faults_of_cables(seed):
