@@ -24,8 +24,13 @@ Vector = list[Any]
 def facet_slacks(
     columns: Sequence[Vector], wrench: Vector, low: Sequence[flint.arb], high: Sequence[flint.arb] | None
 ) -> list[tuple[Any, bool | None]]:
-    """Bound of the margin by each facet, and whether the facet exists: yes, no, or it is not known."""
-    slacks = []
+    """Bound of the margin by each facet, and whether the facet exists: yes, no, or it is not known.
+
+    With largest tensions half of the widths of the ranges bound it, too.
+    """
+    zero = wrench[0] * 0
+    slacks: list[tuple[Any, bool | None]] = []
+    slacks += [] if high is None else [(zero + (up - down) / 2, True) for down, up in zip(low, high, strict=True)]
     for chosen in itertools.combinations(range(len(columns)), len(wrench) - 1):
         normal = _normal([columns[k] for k in chosen], len(wrench))
         products = {k: dot(normal, column) for k, column in enumerate(columns) if k not in chosen}
