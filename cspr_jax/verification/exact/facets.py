@@ -5,7 +5,8 @@ tensions between low + s and high - s reach the wrench w along c where
 
     sum over k of (g_k (high_k - s) if g_k > 0, else g_k (low_k + s)) - c . w >= 0,
 
-which bounds s from above; the margin is the smallest of these bounds (Bouchard, Gosselin and Moore 2010).
+which bounds s from above, as half of the widths of the ranges do; the margin is the smallest of these bounds (Bouchard,
+Gosselin and Moore 2010).
 """
 
 from __future__ import annotations
@@ -24,10 +25,7 @@ Vector = list[Any]
 def facet_slacks(
     columns: Sequence[Vector], wrench: Vector, low: Sequence[flint.arb], high: Sequence[flint.arb] | None
 ) -> list[tuple[Any, bool | None]]:
-    """Bound of the margin by each facet, and whether the facet exists: yes, no, or it is not known.
-
-    With largest tensions half of the widths of the ranges bound it, too.
-    """
+    """Bounds of the margin by widths and facets, and whether each exists: yes, no, or it is not known."""
     zero = wrench[0] * 0
     slacks: list[tuple[Any, bool | None]] = []
     slacks += [] if high is None else [(zero + (up - down) / 2, True) for down, up in zip(low, high, strict=True)]
