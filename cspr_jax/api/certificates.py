@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.config.reading import read_text
 from cspr_jax.errors import ConfigError
-from cspr_jax.runtime.exact_arithmetic import need_exact
+from cspr_jax.runtime.exact_arithmetic import LIBRARY_LOCK, need_exact
 
 
 class CertificateFinding(NamedTuple):
@@ -50,7 +50,8 @@ def verify_certificate(path: str | Path) -> CertificateFinding:
 
     path = Path(path)
     try:
-        finding = check(read(read_text(path)))
+        with LIBRARY_LOCK:
+            finding = check(read(read_text(path)))
     except NotACertificate as error:
         raise ConfigError(path, f"no certificate: {error}") from error
     return CertificateFinding(finding.holds, finding.message)

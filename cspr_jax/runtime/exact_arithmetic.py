@@ -2,10 +2,13 @@
 
 import functools
 import importlib.util
+import threading
 
 from cspr_jax.errors import ConfigError
 
 HOW = "pip install 'cspr_jax[exact]'"
+# The library holds precision and number of coefficients for the whole process, so that threads take turns.
+LIBRARY_LOCK = threading.RLock()
 
 
 @functools.cache

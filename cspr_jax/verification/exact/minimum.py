@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import flint
 
 from cspr_jax.verification.exact.components import Component
-from cspr_jax.verification.exact.series import SeriesPiece, ball, number
+from cspr_jax.verification.exact.series import ORDER, SeriesPiece, ball, number
 
 # Components of a slack on a piece around a time since its start; within a radius of it, if one is given.
 Components = Callable[[SeriesPiece, flint.arb, flint.arb | None], list[Component]]
@@ -108,7 +108,7 @@ def _bounds(components: Components, block: PiecePart) -> tuple[flint.arb, flint.
 
 def attained(components: list[Component]) -> flint.arb:
     """Value of a slack at one time, from its components there; inf where it is not known."""
-    values = [part.value[0] for part in components if part.applies]
+    values = [part.value[0] for part in components if part.applies and part.value.prec > 0]
     finite = [value for value in values if value.is_finite()]
     if not finite:
         return flint.arb("inf")
@@ -120,6 +120,8 @@ def attained(components: list[Component]) -> flint.arb:
 
 def lowest(at: Any, over: Any, radius: flint.arb) -> tuple[flint.arb, Fraction]:
     """Lower bound of a component from its series in the middle and over the block, and about where it is lowest."""
+    if min(at.prec, over.prec) < ORDER:  # coefficients beyond it read as zero
+        return flint.arb("-inf"), Fraction(0)
     value, rate = at[0], at[1]
     bounds = [over[0].lower(), (value - abs(over[1]).upper() * radius).lower()]
     curvature, offset = over[2].lower(), Fraction(0)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import flint
 
 from cspr_jax.motion.formulas import MotionPiece, Program, program
+from cspr_jax.runtime.exact_arithmetic import LIBRARY_LOCK
 
 ORDER = 3  # coefficients of slacks: value, first derivative, half of the second one
 STATES = ORDER + 2  # coefficients of positions, whose second derivatives enter slacks
@@ -24,13 +25,14 @@ Series: Any = flint.arb_series
 
 @contextmanager
 def precision(bits: int) -> Iterator[None]:
-    """Compute with balls of this precision, and with as many coefficients as slacks need."""
-    earlier = flint.ctx.prec, flint.ctx.cap
-    flint.ctx.prec, flint.ctx.cap = bits, STATES
-    try:
-        yield
-    finally:
-        flint.ctx.prec, flint.ctx.cap = earlier
+    """Compute with balls of this precision, and with as many coefficients as slacks need; one thread at a time."""
+    with LIBRARY_LOCK:
+        earlier = flint.ctx.prec, flint.ctx.cap
+        flint.ctx.prec, flint.ctx.cap = bits, STATES
+        try:
+            yield
+        finally:
+            flint.ctx.prec, flint.ctx.cap = earlier
 
 
 def ball(number: Fraction | float | int | str) -> flint.arb:
@@ -116,7 +118,10 @@ class SeriesPiece:
 
 def _narrowed(middle: Any, over: Any, offset: Any) -> Any:
     # Balls over a block from the Taylor polynomial in its middle; the last coefficient over the block is the remainder.
+    # Coefficients beyond the order of a series read as zero: where the order is too low, nothing is bounded.
     last = STATES - 1
+    if min(middle.prec, over.prec) < STATES:
+        return _unbounded()
     if not (over[last].is_finite() and all(middle[k].is_finite() for k in range(last))):
         return over
     polynomial = flint.arb_poly([*(middle[k] for k in range(last)), over[last]])
@@ -187,7 +192,7 @@ def root(x: Any) -> Any:
 
 
 def _unbounded() -> Any:
-    return Series([flint.arb("nan")] * STATES)
+    return Series([flint.arb("nan")] * STATES, STATES)
 
 
 BINARY: dict[str, Callable[[Any, Any], Any]] = {
@@ -225,7 +230,7 @@ def absolute(x: Any) -> Any:
     if value < 0:
         return -x
     rate = abs(x[1])
-    return Series([abs(value), rate.union(-rate), flint.arb("nan")], ORDER)
+    return Series([abs(value), rate.union(-rate), flint.arb("nan")], min(x.prec, ORDER))
 
 
 def turning(quaternion: Sequence[Any]) -> tuple[list[list[Any]], list[Any], list[Any]]:

@@ -105,7 +105,7 @@ def _norm(vector: list[Any]) -> Any:
     square = dot(vector, vector)
     if square[0] > 0:
         return square.sqrt()
-    return flint.arb_series([_largest_norm(vector), *[flint.arb("nan")] * (ORDER - 1)], ORDER)
+    return flint.arb_series([_largest_norm(vector), *[flint.arb("nan")] * (ORDER - 1)], min(square.prec, ORDER))
 
 
 def _largest_norm(vector: list[Any]) -> flint.arb:
