@@ -192,7 +192,8 @@ def test_cables_that_cross_are_shown():
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_motions_have_certificates(kind):
-    compare_random(kind, range(2))
+    """One each: of twelve seeds two have pulleys and winches, two pulleys alone, four winches alone."""
+    compare_random(kind, [KINDS.index(kind)])
 
 
 @pytest.mark.soak

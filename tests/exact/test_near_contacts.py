@@ -35,13 +35,14 @@ def _from_segment(point, start, ray):
     return oracle.dot(gap, gap)
 
 
-def smallest_distance(robot, pieces, segments, count=24):
-    """Square of the smallest distance of two segments along a motion, whose ends are functions of the state."""
+def smallest_distance(pieces, pairs, count=24):
+    """Square of the smallest distance of any pair of segments along a motion, whose ends are functions of the state."""
 
-    def function(piece):
+    def function(piece, segments):
         return lambda u: -squared_distance(*segments(oracle.piece_state(piece, u)))
 
-    return -oracle.largest_value([function(p) for p in pieces], [p.width for p in pieces], count, oracle.BRACKET)[2]
+    functions, pieces = zip(*((function(p, s), p) for p, s in itertools.product(pieces, pairs)), strict=True)
+    return -oracle.largest_value(functions, [p.width for p in pieces], count, oracle.BRACKET)[2]
 
 
 def wrong_verdicts(checked, square, flag):
@@ -61,14 +62,13 @@ def faults_of_cables(seed):
 
     def segments(i, j):
         def ends(state):
-            points = [point for point, *_ in oracle.attachments(robot, state)]
-            return robot.base[i], points[i], robot.base[j], points[j]
+            points = [oracle.plus(state.position, oracle.applied(state.rotation, robot.platform[k])) for k in (i, j)]
+            return robot.base[i], points[0], robot.base[j], points[1]
 
         return ends
 
-    square = min(
-        smallest_distance(robot, pieces, segments(i, j), 12) for i, j in itertools.combinations(range(case.n_cables), 2)
-    )
+    pairs = [segments(i, j) for i, j in itertools.combinations(range(case.n_cables), 2)]
+    square = smallest_distance(pieces, pairs, 12)
 
     def verdict(diameter):
         return cases.Case(cspr_jax.with_cables(case.robot, cable_diameter=diameter), case.samples).checked().verdict
@@ -94,15 +94,14 @@ def faults_of_cylinders(seed):
     exact = oracle.robot_of(plan.problem.robot)
     pieces = [piece for leg in plan.legs for motion in leg.motions for piece in oracle.pieces_of(motion)]
     rod = [oracle.rationals(x) for x in axis]
-    squares = [
-        smallest_distance(exact, pieces, lambda state, k=k: (exact.base[k], state.position, *rod)) for k in range(3)
-    ]
+    pairs = [lambda state, k=k: (exact.base[k], state.position, *rod) for k in range(3)]
+    square = smallest_distance(pieces, pairs)
 
     def verdict(radius):
         words = {segment["verdict"] for segment in planned(radius).to_dict()["segments"]} - {"feasible"}
         return "+".join(sorted(words)) or "feasible"
 
-    return list(wrong_verdicts(verdict, min(squares), "obstacle"))
+    return list(wrong_verdicts(verdict, square, "obstacle"))
 
 
 def test_distances_of_segments():

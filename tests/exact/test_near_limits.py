@@ -90,7 +90,7 @@ def test_point_masses(make):
 @THOROUGH
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 def test_more_point_masses(make):
-    assert faults_of_point_masses(make, 2, 2, cases.SHARES)[0] == []
+    assert faults_of_point_masses(make, 2, 1, cases.SHARES)[0] == []
 
 
 @SOAK
