@@ -28,6 +28,7 @@ import numpy as np
 from cspr_jax.numerics.elementary import keeps_nan
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.compile_cache import PROGRAMS
+from cspr_jax.runtime.compiled_code import limit_compiled_code
 from cspr_jax.runtime.packed import inflated
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
 
@@ -69,6 +70,7 @@ def persistent_jit(
 
     @functools.wraps(function)
     def call(*arguments: Any, **keywords: Any) -> Any:
+        limit_compiled_code()
         # jax does not declare the types of its settings.
         if PROGRAMS in os.environ and not jax.config.jax_disable_jit:  # type: ignore[attr-defined]
             with contextlib.suppress(*_TROUBLE):
