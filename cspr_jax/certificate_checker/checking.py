@@ -4,22 +4,23 @@ from bisect import bisect_right
 from collections import namedtuple
 from collections.abc import Iterator
 from functools import partial
-from itertools import chain, pairwise
+from itertools import chain, combinations, pairwise
+from threading import Lock
 from typing import Any
 
 from flint import arb, ctx, fmpq
 
-from cspr_jax.certificate_checker.criteria import Criterion, criteria, crossings, hull, margins
+from cspr_jax.certificate_checker.criteria import Criterion, criteria, crossing, hull, margins
 from cspr_jax.certificate_checker.reading import Fields, check_order, parse, read_statement, refuse
-from cspr_jax.certificate_checker.series import ORDER, Undefined, dot, plus, tight
+from cspr_jax.certificate_checker.series import ORDER, Undefined, dot, plus, term, tight
 from cspr_jax.certificate_checker.state import State
 
 MAX_PARTS, MAX_DEPTH = 4096, 100  # parts of a block, each a half of a half and so on
+MAX_WORK = 200_000_000  # steps of all states of a file
 SAME, SAME_TIME = fmpq(1, 10**8), fmpq(1, 100)  # where pieces meet: m, entries of rotations, and m/s times s
-FILE = {
-    **dict.fromkeys(["format", "verdict", "sha256", "name?", "note?"], "text"),
-    **dict.fromkeys(["version", "robot", "limits", "motion", "scene?"], "any"),
-}
+LOCK = Lock()  # ctx is that of the whole process
+FILE = dict.fromkeys(["format", "verdict", "sha256", "name?", "note?"], "text")
+FILE |= dict.fromkeys(["version", "robot", "limits", "motion", "scene?"], "any")
 Finding = namedtuple("Finding", "holds message")  # whether the proof holds, and a line that says so
 
 
@@ -30,18 +31,18 @@ def check(content: Any) -> Finding:
     right = content["format"] == "cspr-certificate" and type(content["version"]) is int and content["version"] == 1
     refuse(not right, "format, version: not those of cspr-certificate, version 1")
     refuse(content["verdict"] not in ("feasible", "infeasible"), "verdict: neither feasible nor infeasible")
-    cap, ctx.cap = ctx.cap, ORDER
-    try:
-        with ctx.workprec(512):
+    with LOCK, ctx.workprec(512):
+        cap, ctx.cap = ctx.cap, ORDER
+        try:
             case = read_statement(content)
             message, doubts = (_feasible if feasible else _infeasible)(content, case, dict(criteria(case)))
             doubt = next(chain(_gaps(case), doubts), "")
-    finally:
-        ctx.cap = cap
-    limits = [f"contacts of {len(case['pairs'])} pairs"] if case["pairs"] else []
-    for name, limit in case["limits"].items():
-        values = limit if isinstance(limit, list) else [limit]
-        limits.append(f"{name} {' to '.join(dict.fromkeys(f'{float(arb(f(values))):g}' for f in (min, max)))}")
+        finally:
+            ctx.cap = cap
+        limits = [f"contacts of {len(case['pairs'])} pairs"] if case["pairs"] else []
+        for name, limit in case["limits"].items():
+            values = limit if isinstance(limit, list) else [limit]
+            limits.append(f"{name} {' to '.join(dict.fromkeys(f'{float(arb(f(values))):g}' for f in (min, max)))}")
     return Finding(not doubt, f"{content['verdict']}, {doubt or message}; limits: {', '.join(limits)}")
 
 
@@ -75,15 +76,25 @@ def _infeasible(content: Fields, case: Fields, named: dict[str, Criterion]) -> t
     return f"fails: {', '.join(texts[:8])}{', ...' * (len(texts) > 8)}", chain(chain.from_iterable(doubts), unreal)
 
 
+def _state(case: Fields, piece: Fields, block: Fields, time: Any, radius: Any) -> State:
+    """Return a state; raises NotACertificate once those of a file have been too much work."""
+    case["work"] += piece["work"]
+    refuse(case["work"] > MAX_WORK, f"the proof: of more than {MAX_WORK} steps")
+    return State(case["robot"], piece, block, time, radius)
+
+
 def _gaps(case: Fields) -> Iterator[str]:
-    """Name pieces that do not meet within the tolerances."""
+    """Name pieces that do not meet within the tolerances, to which the jumps before count too."""
+    sums: list[Any] = []
     for k, (one, two) in enumerate(pairwise(case["pieces"])):
         try:
-            first, second = (State(case["robot"], piece, piece, two["start"], fmpq(0)) for piece in (one, two))
+            first, second = (_state(case, piece, piece, two["start"], fmpq(0)) for piece in (one, two))
             turns = zip(chain(*first.rotation), chain(*second.rotation), strict=True)
             jumps = [plus(first.position, second.position, -1), *([a - b] for a, b in turns)]
             rates = [[entry.derivative() * SAME_TIME for entry in jump] for jump in jumps]
-            if not all(dot(gap, gap)[0] <= SAME**2 for gap in jumps + rates):
+            sizes = [term(dot(gap, gap)).abs_upper().sqrt() for gap in jumps + rates]
+            sums = plus(sizes, sums or [0] * len(sizes))
+            if not all(total <= SAME for total in sums):
                 yield f"motion.pieces[{k}] and the next do not meet"
         except Undefined:
             yield f"motion.pieces[{k}] or the next is not defined where they meet"
@@ -97,7 +108,7 @@ def _doubts(case: Fields, piece: Fields, block: Fields, claims: list[Any], name:
         middle = (start + end) / 2
         with ctx.workprec(64 + 8 * depth):
             try:
-                state = State(case["robot"], piece, block, middle, (end - start) / 2)
+                state = _state(case, piece, block, middle, (end - start) / 2)
                 left = [claim for claim in left if not _shown(state, *claim[1:])]
             except Undefined:
                 pass
@@ -113,12 +124,12 @@ def _shown(state: State, criterion: Criterion, bound: Any) -> bool:
     """Say that balls show a slack to exceed a bound at all times of a state."""
     try:
         over = margins(criterion, state, bound)
-        if all(margin[0] > 0 for margin in over):
+        if all(term(margin) > 0 for margin in over):
             return True
-        middle = margins(criterion, state.middle or state, bound)
+        pairs = zip(margins(criterion, state.middle or state, bound), over, strict=True)
+        return all(term(tight(*pair, state.radius)) > 0 for pair in pairs)
     except Undefined:
         return False
-    return all(tight(*pair, state.radius)[0] > 0 for pair in zip(middle, over, strict=True))
 
 
 def _failure(case: Fields, named: dict[str, Criterion], value: Any, key: str, sizes: dict[str, int]) -> Fields:
@@ -138,18 +149,24 @@ def _failure(case: Fields, named: dict[str, Criterion], value: Any, key: str, si
     return {**failure, "start": start, "end": end, "pieces": pieces, "named": named[name], "pair": pair}
 
 
+def _crosses(case: Fields, piece: Fields, failure: Fields, rays: tuple[int, int]) -> bool:
+    """Say that balls show segments, or a spool and two rays of a cone, to pass each other; raises Undefined."""
+    pair = failure["pair"]
+    ends = [crossing(_state(case, piece, piece, failure[key], fmpq(0)), pair, rays) for key in ("start", "end")]
+    within = all(term(value) < 0 for end in ends for value in end[1:])
+    sides = pair[0]["flat"] or term(ends[0][0]) * term(ends[1][0]) < 0
+    touching = Criterion(0, 0, lambda state: crossing(state, pair, rays)[1:])
+    return sides and within and not any(_doubts(case, piece, failure, [("", touching, 0)], ""))
+
+
 def _fails(case: Fields, piece: Fields, failure: Fields) -> bool:
     """Say that balls show a slack in a piece to be less than minus its allowance, or bodies to touch in between."""
     allowance, pair, limits = arb(failure["named"].allowance_squared).sqrt(), failure["pair"], case["limits"]
     try:
-        state, last = (State(case["robot"], piece, piece, failure[key], fmpq(0)) for key in ("start", "end"))
         if "until" in failure:
-            for k, (before, after) in enumerate(zip(crossings(state, pair), crossings(last, pair), strict=True)):
-                touching = Criterion(0, 0, partial(lambda s, k: list(crossings(s, pair))[k][1:], k=k))
-                sides = pair[0]["flat"] or before[0][0] * after[0][0] < 0
-                if sides and not any(_doubts(case, piece, failure, [("", touching, 0)], "")):
-                    return True
-            return False
+            count = next((len(body["cone"]) for body in pair if "cone" in body), 2)
+            return any(_crosses(case, piece, failure, rays) for rays in combinations(range(count), 2))
+        state = _state(case, piece, piece, failure["time"], fmpq(0))
         if pair:
             ends = []
             for body, stated in zip(pair, failure["points"], strict=True):
@@ -159,14 +176,14 @@ def _fails(case: Fields, piece: Fields, failure: Fields) -> bool:
                 refuse(not right, "failures: points: not a weight for each point, or their sum is not 1")
                 ends.append([dot(weights, column) for column in zip(*points, strict=True)])
             gap = plus(ends[0], ends[1], -1)
-            return bool(dot(gap, gap)[0] < sum(body["radius"] for body in pair) ** 2)
+            return bool(term(dot(gap, gap)) < sum(body["radius"] for body in pair) ** 2)
         if "wrench" not in failure:
-            return any(margin[0] < 0 for margin in margins(failure["named"], state, -allowance))
+            return any(term(margin) < 0 for margin in margins(failure["named"], state, -allowance))
         y, largest = failure["wrench"], arb(0)  # by Farkas' lemma
         highest = limits.get("tension_max", [arb.pos_inf()] * case["sizes"]["n"])
         for i, (low, high) in enumerate(zip(limits["tension_min"], highest, strict=True)):
-            product = dot(y, state.columns[i * len(y) : (i + 1) * len(y)])[0]
+            product = term(dot(y, state.columns[i * len(y) : (i + 1) * len(y)]))
             largest += (product * (low - allowance)).max(product * (high + allowance))
-        return bool(dot(y, state.wrench)[0] > largest)
+        return bool(term(dot(y, state.wrench)) > largest)
     except Undefined:
         return False

@@ -3,13 +3,12 @@
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import combinations
 from typing import Any
 
 from flint import arb, arb_series, fmpq, fmpq_mat
 
 from cspr_jax.certificate_checker.reading import FLAGS, MOTORS, Fields, refuse
-from cspr_jax.certificate_checker.series import Undefined, cross, dot, plus
+from cspr_jax.certificate_checker.series import Undefined, cross, dot, plus, term
 from cspr_jax.certificate_checker.state import State
 
 SINGULAR, STANDSTILL = fmpq(1, 10**9), fmpq(1, 10**6)  # smallest normalised determinant; speed of a motor, rad/s
@@ -92,7 +91,7 @@ def _cable_values(state: State, name: str, i: int) -> list[Any]:
 def _torques(state: State, i: int, drive: Fields, speed: Any) -> list[Any]:
     """Return the torque of a motor with either friction that may count, the same for a state and its middle, N m."""
     if i not in state.frictions:
-        balls = {p: speed[0] * p + STANDSTILL for p in (1, -1)}
+        balls = {p: term(speed) * p + STANDSTILL for p in (1, -1)}
         if not state.radius and not all(ball.abs_lower() > 0 for ball in balls.values()):
             raise Undefined("a case is not decided")
         state.frictions[i] = [p for p, ball in balls.items() if not ball < 0]
@@ -117,22 +116,22 @@ def hull(state: State, body: Fields) -> list[list[Any]]:
         return [plus(state.position, state.turn(body["corner"])), *map(state.turn, body["cone"])]
     cable, end = state.cables[body[body["kind"]]], state.attachments[body[body["kind"]]]
     if "leave" in body:
-        if not cable.free[0] > body["leave"]:
+        if not term(cable.free) > body["leave"]:
             raise Undefined("nothing is left of a cable")
         end = plus(end, cable.unit, body["leave"])
     points = [cable.leaving] if body["kind"] == "spool" else [cable.leaving, end]
     return [[x, y * (0 if body["flat"] else 1), z] for x, y, z in points]
 
 
-def crossings(state: State, pair: list[Fields]) -> Iterator[list[Any]]:
-    """List what is zero where two segments, or a cone and a spool, may touch, then what is negative if they then do."""
+def crossing(state: State, pair: list[Fields], rays: tuple[int, int]) -> list[Any]:
+    """Return what is zero where two segments, or two rays and a spool, may touch, and what is negative if they do."""
     (p, *first), (q, *second) = sorted((hull(state, body) for body in pair), key=len, reverse=True)
     r = plus(q, p, -1)
-    for a, b in [(plus(first[0], p, -1), plus(q, second[0], -1))] if second else combinations(first, 2):
-        normal = cross(a, b)
-        coordinates = [dot(cross(r, b), normal), dot(cross(a, r), normal)]  # r = s a + t b + ..., s and t times N . N
-        beyond = [coordinate - dot(normal, normal) for coordinate in coordinates if second]
-        yield [dot(r, normal), *(-coordinate for coordinate in coordinates), *beyond]
+    a, b = (plus(first[0], p, -1), plus(q, second[0], -1)) if second else (first[k] for k in rays)
+    normal = cross(a, b)
+    coordinates = [dot(cross(r, b), normal), dot(cross(a, r), normal)]  # r = s a + t b + ..., s and t times N . N
+    beyond = [coordinate - dot(normal, normal) for coordinate in coordinates if second]
+    return [dot(r, normal), *(-coordinate for coordinate in coordinates), *beyond]
 
 
 def _contact(state: State, pair: list[Fields], k: int) -> list[Any]:

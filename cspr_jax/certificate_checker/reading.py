@@ -3,24 +3,20 @@
 import hashlib
 import json
 import re
+from math import prod
 from typing import Any
 
 from flint import fmpq
 
-MAX_CHARACTERS = 4000  # of one number
+MAX_CHARACTERS, MAX_COEFFICIENTS, MAX_POINTS = 4000, 100, 10000  # of a number, of a step, of one body times another
 NUMBER = re.compile(r"(-?[0-9]+)(?:\.([0-9]+))?(?:[eE]([+-]?[0-9]{1,4}))?|(-?[0-9]+)/([0-9]+)")
 Fields = dict[str, Any]
-WINCHES = {
-    **dict.fromkeys(["drum_radius", "gear_ratio", "stall_torque?", "no_load_speed?"], "positive n"),
-    **dict.fromkeys(["motor_inertia", "friction", "viscous_friction"], "nonnegative n"),
-    "efficiency": "share n",
-}
-ROBOT = {
-    **dict.fromkeys(["base_points", "platform_points?"], "number n 3"),
-    **{"mass": "positive", "gravity": "positive", "forces": "<3 *", "moments": "<3 *"},
-    **{"inertia?": "number 3 3", "line_axes?": "number 2 3", "joint_arm?": "number 3"},
-    **{"pulleys?": {"radius": "nonnegative n", "axes": "number n 3"}, "winches?": WINCHES},
-}
+WINCHES = dict.fromkeys(["drum_radius", "gear_ratio", "stall_torque?", "no_load_speed?"], "positive n")
+WINCHES |= dict.fromkeys(["motor_inertia", "friction", "viscous_friction"], "nonnegative n") | {"efficiency": "share n"}
+ROBOT: Fields = dict.fromkeys(["base_points", "platform_points?"], "number n 3")
+ROBOT |= {"mass": "positive", "gravity": "positive", "forces": "<3 *", "moments": "<3 *"}
+ROBOT |= {"inertia?": "number 3 3", "line_axes?": "number 2 3", "joint_arm?": "number 3"}
+ROBOT |= {"pulleys?": {"radius": "nonnegative n", "axes": "number n 3"}, "winches?": WINCHES}
 FLAGS = {  # of the limits of cables
     "tension_min": "slack_cable",
     "tension_max": "over_tension",
@@ -146,15 +142,21 @@ def read_statement(content: Fields) -> Fields:
         refuse(mistake, f"robot: {message}")
     hull = {"body?": {"corners": "number + 3"}} if body else {}
     scene = parse(content.get("scene", {"pairs": []}), {"pairs": ((_body, "2"), "*"), **hull}, "scene", sizes)
-    for one, two in scene["pairs"]:
-        one["flat"] = two["flat"] = robot["forces"] == [0, 2] and one["kind"] == two["kind"] == "cable"
     kinds = {entry["kind"] for pair in scene["pairs"] for entry in pair}
     refuse(("cone" in kinds and not body) or ("body" in kinds and "body" not in scene), "scene.pairs: no such body")
+    robot["corners"] = scene.get("body", {}).get("corners", [])
+    count, work = {"cable": 2, "spool": 1, "body": len(robot["corners"])}, 100 * (sizes["n"] + len(robot["corners"]))
+    for k, (one, two) in enumerate(scene["pairs"]):
+        one["flat"] = two["flat"] = robot["forces"] == [0, 2] and one["kind"] == two["kind"] == "cable"
+        points = prod(count.get(body["kind"]) or len(body[body["kind"]]) for body in (one, two))
+        refuse(points > MAX_POINTS, f"scene.pairs[{k}]: more than {MAX_POINTS} points of one body times the other")
+        work += points
     motion = parse(content["motion"], {"duration": "positive", "pieces": (_piece, "+")}, "motion", sizes)
     check_order(motion["pieces"], "motion.pieces", motion["duration"])
     limits = {"tension_min": [fmpq(0)] * sizes["n"], **limits, "touched": limits.get("touched", fmpq(0))}
-    robot["corners"] = scene.get("body", {}).get("corners", [])
-    return {"robot": robot, "limits": limits, "pairs": scene["pairs"], **motion, "sizes": sizes}
+    for piece in motion["pieces"]:
+        piece["work"] = work + sum(len(step[1]) if step[0] == "poly" else 1 for step in piece["program"])
+    return {"robot": robot, "limits": limits, "pairs": scene["pairs"], **motion, "sizes": sizes, "work": 0}
 
 
 def _body(value: Any, key: str, sizes: dict[str, int]) -> Fields:
@@ -183,6 +185,7 @@ def _program(value: Any, key: str, sizes: dict[str, int]) -> list[list[Any]]:
         refuse(not poly and (not isinstance(name, str) or len(operands) != OPERANDS.get(name)), f"{key}[{k}]: no step")
         table = "number +" if poly else "<steps"
         steps.append([name, *(parse(entry, table, f"{key}[{k}]", {**sizes, "steps": k}) for entry in operands)])
+        refuse(poly and len(steps[-1][1]) > MAX_COEFFICIENTS, f"{key}[{k}]: more than {MAX_COEFFICIENTS} coefficients")
     return steps
 
 

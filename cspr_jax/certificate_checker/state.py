@@ -7,7 +7,7 @@ from typing import Any
 from flint import arb, arb_mat, arb_series
 
 from cspr_jax.certificate_checker.reading import Fields
-from cspr_jax.certificate_checker.series import ORDER, Undefined, angle, apply, cross, dot, plus, run, tight
+from cspr_jax.certificate_checker.series import ORDER, Undefined, angle, apply, cross, dot, plus, run, term, tight
 
 Cable = namedtuple("Cable", "leaving unit free length")  # unit vector from effector to spool; free and whole length
 
@@ -125,7 +125,8 @@ class State:
 
 def _coefficients(entries: list[Any], rows: int) -> list[arb_mat]:
     """Return the coefficients of a matrix of series, given one row after the other."""
-    return [arb_mat(rows, len(entries) // rows, [entry[k] for entry in entries]) for k in range(ORDER - 2)]
+    columns = len(entries) // rows
+    return [arb_mat(rows, columns, [term(entry, k) for entry in entries]) for k in range(ORDER - 2)]
 
 
 def _solve(matrix: list[arb_mat], right: list[arb_mat]) -> list[arb_mat]:
