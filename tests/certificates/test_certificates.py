@@ -104,6 +104,19 @@ def test_nothing_is_written_of_what_is_not_proved(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_bodies_of_more_points_than_the_format_allows(monkeypatch):
+    """Cables beside a sphere: two points times one."""
+    robot = {"name": "triangle", "mass": 2.0, "base_points": SPOOLS}
+    sphere = {"kind": "sphere", "centre": [1.0, 1.0, 2.0], "radius": 0.1}
+    poses = [{"position": point, "time": time} for point, time in zip(POINTS, TIMES, strict=True)]
+    plan = cspr_jax.plan({"schema": 1, "family": "spline", "robot": robot, "obstacle": [sphere], "pose": poses})
+    monkeypatch.setattr("cspr_jax.verification.certificates.statement.MOST_POINTS", 2)
+    assert holds(plan.certificate())
+    monkeypatch.setattr("cspr_jax.verification.certificates.statement.MOST_POINTS", 1)
+    with pytest.raises(ConfigError, match="at most 1 points of one body times those of another"):
+        plan.certificate()
+
+
 def test_commands_write_and_verify(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rows = "\n".join(f"{t},{x},{y},{z}" for t, (x, y, z) in zip(TIMES, POINTS, strict=True))

@@ -23,6 +23,7 @@ from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.verification.criteria import bounds_tensions
 from cspr_jax.verification.exact.contacts import obstacle_points, sector_vectors
 
+MOST_POINTS = 10_000  # of one body of a pair times those of the other, as the format allows
 LONGEST_DECIMAL = 60  # digits of a number that is not written as a fraction
 WINCH_NUMBERS = ("drum_radius", "gear_ratio", "motor_inertia", "friction", "viscous_friction", "efficiency")
 
@@ -101,8 +102,16 @@ def scene_statement(robot: AnyRobot, scene: Scene) -> dict[str, Any] | None:
     pairs = [_pair(robot, scene, bodies, *each) for each in contact_pairs(robot, scene)]
     if not pairs:
         return None
-    corners = {} if bodies.body is None else {"body": {"corners": texts(bodies.body.corners)}}
-    return {"pairs": pairs} | corners
+    corners = [] if bodies.body is None else texts(bodies.body.corners)
+    if any(_count(one, corners) * _count(two, corners) > MOST_POINTS for one, two in pairs):
+        raise NoCertificateError(f"a certificate holds at most {MOST_POINTS} points of one body times those of another")
+    return {"pairs": pairs} | ({"body": {"corners": corners}} if corners else {})
+
+
+def _count(entry: dict[str, Any], corners: list) -> int:
+    # Number of points of a body of a pair.
+    points = corners if "body" in entry else entry.get("points", entry.get("cone"))
+    return (1 if "spool" in entry else 2) if points is None else len(points)
 
 
 def _pair(robot: AnyRobot, scene: Scene, bodies: Bodies, kind: str, cable: int, other: int) -> list[dict[str, Any]]:
