@@ -51,8 +51,12 @@ def read(text: str) -> Fields:
         content: Fields = json.loads(text, object_pairs_hook=_unique)
         refuse(not isinstance(content, dict), "no JSON object")
         refuse(content.get("sha256") != checksum(content), "sha256: truncated or altered")
-    except (ValueError, RecursionError) as error:
-        raise NotACertificate(f"the file: {str(error)[:120]!a}") from None
+    except json.JSONDecodeError as error:
+        raise NotACertificate(f"the file: no JSON from line {error.lineno}, column {error.colno} on") from None
+    except NotACertificate:
+        raise
+    except (ValueError, RecursionError):  # an integer of thousands of digits, half of a character, or too deep a nest
+        raise NotACertificate("the file: no JSON that can be read") from None
     return content
 
 
@@ -63,8 +67,11 @@ def checksum(content: Fields) -> str:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Fields:
-    refuse(len(dict(pairs)) < len(pairs), f"a key stands twice among {str([key for key, _ in pairs])[:80]!a}")
-    return dict(pairs)
+    fields: Fields = {}
+    for key, value in pairs:
+        refuse(key in fields, f"the file: the key {key[:40]!a} stands twice in an object")
+        fields[key] = value
+    return fields
 
 
 def _number(value: Any, key: str) -> Any:

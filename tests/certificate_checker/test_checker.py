@@ -781,10 +781,17 @@ def test_unreadable_files(file):
         read(file)
 
 
+def test_where_a_file_is_no_json():
+    with pytest.raises(NotACertificate, match=r"no JSON from line 2, column 4 on$"):
+        read("[1,\n 2,,]")
+    with pytest.raises(NotACertificate, match=r"no JSON that can be read$"):
+        read("1" * 6000)
+
+
 def test_keys_that_stand_twice():
     content = simple()
     file = json.dumps(content | {"sha256": checksum(content)})
-    with pytest.raises(NotACertificate, match="twice"):
+    with pytest.raises(NotACertificate, match="the key 'version' stands twice"):
         read(file.replace('"version": 1', '"version": 2, "version": 1'))
 
 
