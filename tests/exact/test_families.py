@@ -155,9 +155,9 @@ def platform_pose(rng, is_turned) -> dict:
     }
 
 
-def platform_swing(rng):
+def platform_swing(rng, kind=None):
     """Its number of arcs and angular accelerations at both ends are those that a plan within loose limits finds."""
-    kind = str(rng.choice(list(TURNED)))
+    kind = kind or str(rng.choice(list(TURNED)))
     poses = [platform_pose(rng, is_turned) for is_turned in TURNED[kind]]
     if kind == "rotation":  # about P0 itself
         poses[0]["position"] = poses[1]["position"] = [0.0, 0.0, 1.4]
@@ -256,6 +256,14 @@ def test_many_motions_of_families(make):
     wrong, number = faults(make, 100, count, shares)
     assert wrong == []
     assert number == 2 * count * len(shares) or (make is platform_swing and number >= count * len(shares))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", TURNED)
+def test_swings_of_each_kind(kind):
+    wrong, number = faults(lambda rng: platform_swing(rng, kind), 200, 1, SHARES)
+    assert wrong == []
+    assert number >= (0 if kind == "rotation" else len(SHARES))
 
 
 @pytest.mark.soak

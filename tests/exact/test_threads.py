@@ -13,6 +13,7 @@ import cspr_jax
 from cspr_jax.verification.exact.components import Component
 from cspr_jax.verification.exact.minimum import attained, lowest
 from cspr_jax.verification.exact.series import STATES, SeriesPieces, absolute, ball, precision
+from cspr_jax.verification.exact.slacks import _norm
 from exact import cases
 
 FEW = (1e-9, -1e-9, 1e-14, -1e-14)
@@ -70,7 +71,7 @@ def test_too_few_coefficients_bound_nothing(count):
         flint.ctx.cap = count
         at, over = piece.state(radius), piece.state(radius, radius)
         for middle, full in zip(at.acceleration, over.acceleration, strict=True):
-            for function in (lambda x: x, absolute):
+            for function in (lambda x: x, lambda x: absolute(0 * x), lambda x: _norm([0 * x] * 3)):
                 bound, _ = lowest(function(middle), function(full), radius)
                 assert bound.is_finite() == (count == STATES)
             assert (attained([Component(middle)]) < flint.arb("inf")) == (count >= STATES - 2)
